@@ -1,0 +1,268 @@
+//! OpenH264, the software decoder of the desktop.
+//!
+//! It answers within `send`, one picture per access unit. Its pictures lie in
+//! its own padded buffers; they are copied row by row into tight planes.
+
+use std::collections::VecDeque;
+
+use openh264::decoder::{DecodedYUV, Decoder as OpenH264};
+use openh264::formats::YUVSource;
+
+use super::{AccessUnit, DecodeError, Decoded, Decoder};
+use crate::YuvPicture;
+
+/// Decodes on the thread that calls it.
+#[derive(Default)]
+pub struct OpenH264Decoder {
+    /// None until the first unit, and again after a flush or an error: a new
+    /// one is the only state of the library that is surely clean.
+    inner: Option<OpenH264>,
+    ready: VecDeque<Decoded>,
+}
+
+impl OpenH264Decoder {
+    /// A decoder that waits for an IDR picture.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    fn decode(&mut self, unit: &AccessUnit) -> Result<YuvPicture, DecodeError> {
+        let inner = match &mut self.inner {
+            Some(inner) => inner,
+            empty => empty.insert(
+                OpenH264::new().map_err(|error| DecodeError::Unavailable(error.to_string()))?,
+            ),
+        };
+        let picture = inner
+            .decode(&unit.bytes)
+            .map_err(|error| DecodeError::Refused(error.to_string()))?
+            .ok_or(DecodeError::NoPicture)?;
+        tight_picture(&picture, unit.size.map(u32::from))
+    }
+}
+
+impl std::fmt::Debug for OpenH264Decoder {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("OpenH264Decoder")
+            .field("ready", &self.ready.len())
+            .finish_non_exhaustive()
+    }
+}
+
+impl Decoder for OpenH264Decoder {
+    fn send(&mut self, unit: AccessUnit) -> Result<(), DecodeError> {
+        let picture = self.decode(&unit);
+        if picture.is_err() {
+            self.inner = None;
+        }
+        self.ready.push_back(Decoded {
+            ticket: unit.ticket,
+            picture,
+        });
+        Ok(())
+    }
+
+    fn poll(&mut self) -> Option<Decoded> {
+        self.ready.pop_front()
+    }
+
+    fn flush(&mut self) {
+        self.inner = None;
+        self.ready.clear();
+    }
+}
+
+/// Copies the visible part of the planes.
+fn tight_picture(picture: &DecodedYUV<'_>, expected: [u32; 2]) -> Result<YuvPicture, DecodeError> {
+    let (width, height) = picture.dimensions();
+    let found = [width as u32, height as u32];
+    if found != expected {
+        return Err(DecodeError::Size { expected, found });
+    }
+    let (y_stride, u_stride, v_stride) = picture.strides();
+    let half = [width / 2, height / 2];
+    Ok(YuvPicture {
+        width: found[0],
+        height: found[1],
+        y: tight_plane(picture.y(), y_stride, [width, height]),
+        u: tight_plane(picture.u(), u_stride, half),
+        v: tight_plane(picture.v(), v_stride, half),
+    })
+}
+
+fn tight_plane(plane: &[u8], stride: usize, [width, height]: [usize; 2]) -> Vec<u8> {
+    let mut tight = Vec::with_capacity(width * height);
+    for row in plane.chunks(stride).take(height) {
+        tight.extend_from_slice(&row[..width]);
+    }
+    tight
+}
+
+#[cfg(test)]
+mod tests {
+    use openh264::encoder::Encoder;
+    use openh264::formats::YUVBuffer;
+    use proptest::prelude::*;
+    use shadecast_protocol::FrameId;
+
+    use super::*;
+    use crate::decode::{DecoderThread, Ticket};
+
+    /// One access unit per picture; the picture of step `n` is grey value
+    /// `40 + 20 n` with a gradient, so that it can be told from the others.
+    fn stream(size: [u16; 2], steps: u8) -> Vec<Vec<u8>> {
+        let mut encoder = Encoder::new().unwrap();
+        (0..steps)
+            .map(|step| {
+                let picture =
+                    YUVBuffer::from_vec(raw_picture(size, step), size[0].into(), size[1].into());
+                encoder.encode(&picture).unwrap().to_vec()
+            })
+            .collect()
+    }
+
+    fn raw_picture(size: [u16; 2], step: u8) -> Vec<u8> {
+        let [width, height] = size.map(usize::from);
+        let luma = (0..width * height).map(|i| 40 + 20 * step + (i % width / 8) as u8);
+        let chroma = std::iter::repeat_n(128, width * height / 2);
+        luma.chain(chroma).collect()
+    }
+
+    fn unit(frame: u32, size: [u16; 2], bytes: &[u8]) -> AccessUnit {
+        AccessUnit {
+            ticket: Ticket {
+                connection: 0,
+                frame: FrameId(frame),
+            },
+            restart: frame == 0,
+            size,
+            bytes: bytes.to_vec(),
+        }
+    }
+
+    fn decode(decoder: &mut OpenH264Decoder, unit: AccessUnit) -> Result<YuvPicture, DecodeError> {
+        let ticket = unit.ticket;
+        decoder.send(unit).unwrap();
+        let decoded = decoder.poll().unwrap();
+        assert_eq!(decoded.ticket, ticket);
+        assert_eq!(decoder.poll(), None);
+        decoded.picture
+    }
+
+    fn mean_difference(a: &[u8], b: &[u8]) -> f64 {
+        assert_eq!(a.len(), b.len());
+        let sum: u64 = a
+            .iter()
+            .zip(b)
+            .map(|(a, b)| u64::from(a.abs_diff(*b)))
+            .sum();
+        sum as f64 / a.len() as f64
+    }
+
+    #[test]
+    fn pictures_come_back_in_order_without_padding() {
+        // Neither side is a multiple of a macroblock, so that the stream crops.
+        let size = [72, 40];
+        let mut decoder = OpenH264Decoder::new();
+        for (step, bytes) in stream(size, 5).iter().enumerate() {
+            let picture = decode(&mut decoder, unit(step as u32, size, bytes)).unwrap();
+            assert_eq!((picture.width, picture.height), (72, 40));
+            let raw = raw_picture(size, step as u8);
+            assert!(mean_difference(&picture.y, &raw[..72 * 40]) < 3.0);
+            assert!(mean_difference(&picture.u, &raw[72 * 40..][..36 * 20]) < 3.0);
+            assert!(mean_difference(&picture.v, &raw[72 * 40..][..36 * 20]) < 3.0);
+        }
+    }
+
+    #[test]
+    fn it_decodes_on_a_thread() {
+        let size = [64, 64];
+        let (results, received) = std::sync::mpsc::channel();
+        let thread = DecoderThread::spawn(OpenH264Decoder::new(), move |decoded| {
+            // The test may have failed and gone.
+            let _ = results.send(decoded.picture.map(|_| decoded.ticket.frame));
+        })
+        .unwrap();
+        for (frame, bytes) in (0..).zip(&stream(size, 5)) {
+            thread.send(unit(frame, size, bytes)).unwrap();
+        }
+        for frame in 0..5 {
+            assert_eq!(received.recv().unwrap(), Ok(FrameId(frame)));
+        }
+    }
+
+    #[test]
+    fn another_size_than_announced_is_an_error() {
+        let mut decoder = OpenH264Decoder::new();
+        let error = decode(&mut decoder, unit(0, [64, 64], &stream([128, 64], 1)[0]));
+        assert_eq!(
+            error,
+            Err(DecodeError::Size {
+                expected: [64, 64],
+                found: [128, 64]
+            })
+        );
+    }
+
+    #[test]
+    fn the_size_may_change_with_an_idr() {
+        let mut decoder = OpenH264Decoder::new();
+        for (frame, size) in [[64, 64], [128, 96], [64, 64]].into_iter().enumerate() {
+            let bytes = &stream(size, 1)[0];
+            let picture = decode(&mut decoder, unit(frame as u32, size, bytes)).unwrap();
+            assert_eq!([picture.width, picture.height], size.map(u32::from));
+        }
+    }
+
+    #[test]
+    fn a_stream_without_its_idr_is_refused_and_an_idr_cures() {
+        let size = [64, 64];
+        let units = stream(size, 3);
+        let mut decoder = OpenH264Decoder::new();
+        assert!(decode(&mut decoder, unit(1, size, &units[1])).is_err());
+        assert!(decode(&mut decoder, unit(2, size, &[])).is_err());
+        assert!(decode(&mut decoder, unit(0, size, &units[0])).is_ok());
+        decoder.flush();
+        assert!(decode(&mut decoder, unit(1, size, &units[1])).is_err());
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn garbage_is_survived(
+            units in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..400), 1..6),
+        ) {
+            let mut decoder = OpenH264Decoder::new();
+            for (frame, bytes) in units.iter().enumerate() {
+                prop_assert!(decode(&mut decoder, unit(frame as u32, [64, 64], bytes)).is_err());
+            }
+        }
+
+        #[test]
+        fn truncated_and_corrupted_streams_are_survived(
+            cut in any::<prop::sample::Index>(),
+            flips in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 0..8),
+        ) {
+            let size = [64, 48];
+            let units = stream(size, 3);
+            let mut decoder = OpenH264Decoder::new();
+            for (frame, bytes) in units.iter().enumerate() {
+                let mut bytes = bytes.clone();
+                for (place, value) in &flips {
+                    let place = place.index(bytes.len());
+                    bytes[place] ^= value;
+                }
+                bytes.truncate(cut.index(bytes.len()));
+                let picture = decode(&mut decoder, unit(frame as u32, size, &bytes));
+                if let Ok(picture) = picture {
+                    prop_assert_eq!(picture.y.len(), 64 * 48);
+                    prop_assert_eq!(picture.u.len(), 32 * 24);
+                }
+            }
+            decoder.flush();
+            prop_assert!(decode(&mut decoder, unit(0, size, &units[0])).is_ok());
+        }
+    }
+}

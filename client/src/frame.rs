@@ -1,0 +1,88 @@
+//! What the drawing thread needs of the world, whole and immutable.
+//!
+//! The network side builds a new [`ClientFrame`] for every picture that has
+//! met its update; the drawing side switches to the newest one between two
+//! display frames and never waits for it (SAS 2018, sections 3.5 and 3.6).
+
+use std::sync::Arc;
+
+use shadecast_protocol::{Epoch, FrameId, Pose, UpdateTiming};
+
+/// A corner of a triangle as the vertex shader reads it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
+pub struct DrawVertex {
+    /// Metres, in the space of its object.
+    pub position: [f32; 3],
+    /// Index into [`ClientFrame::transforms`].
+    pub object: u32,
+    /// Atlas position in texels; texel centres lie at halves.
+    pub texel: [f32; 2],
+}
+
+/// A decoded 4:2:0 picture, limited-range BT.709, planes without padding.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct YuvPicture {
+    /// In texels, even.
+    pub width: u32,
+    /// In texels, even.
+    pub height: u32,
+    /// `width * height` bytes.
+    pub y: Vec<u8>,
+    /// `width * height / 4` bytes.
+    pub u: Vec<u8>,
+    /// `width * height / 4` bytes.
+    pub v: Vec<u8>,
+}
+
+/// Where an alpha-masked patch is there: one byte a texel of the atlas, 255 or
+/// 0; 255 wherever no mask says otherwise.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct MaskAtlas {
+    /// In texels.
+    pub width: u32,
+    /// In texels.
+    pub height: u32,
+    /// `width * height` bytes.
+    pub coverage: Vec<u8>,
+}
+
+/// When this end did what with a frame, nanoseconds on the client's clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ClientTiming {
+    /// When the later of picture and update arrived.
+    pub received: u64,
+    /// When the picture was decoded and the update applied.
+    pub decoded: u64,
+    /// Nanoseconds to add to a server time to get a client time.
+    pub client_minus_server: i64,
+}
+
+/// A picture and the geometry that it belongs to.
+#[derive(Clone, Debug)]
+pub struct ClientFrame {
+    /// Its name.
+    pub frame: FrameId,
+    /// The placement it shows.
+    pub epoch: Epoch,
+    /// The pose of the head that the server made it for.
+    pub world_from_head: Pose,
+    /// The scene's own time when the server began it, nanoseconds.
+    pub scene_time: u64,
+    /// The server's share of the latency.
+    pub server_timing: UpdateTiming,
+    /// This end's share.
+    pub timing: ClientTiming,
+    /// All corners of all placed patches.
+    pub vertices: Arc<Vec<DrawVertex>>,
+    /// Counter-clockwise triangles; double-sided ones appear in both windings.
+    pub indices: Arc<Vec<u32>>,
+    /// `world_from_object` of every object; index 0 is the identity.
+    pub transforms: Arc<Vec<Pose>>,
+    /// The shading.
+    pub picture: Arc<YuvPicture>,
+    /// Present only where a placed patch is alpha-masked.
+    pub masks: Option<Arc<MaskAtlas>>,
+    /// Patches placed.
+    pub patches: u32,
+}

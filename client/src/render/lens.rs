@@ -1,0 +1,271 @@
+//! Bends the finished pictures against the lenses of a headset, for every pixel
+//! and each colour by itself (SAS 2018, section 3.6).
+//!
+//! The middle keeps its scale. What is drawn is what a lens with pincushion
+//! distortion straightens again, and its colour fringes cancel.
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::EyeImages;
+
+/// Radial distortion of a pair of lenses.
+///
+/// Lengths are half heights of one eye's picture. A pixel at distance `r` from
+/// the axis shows what the undistorted picture has at
+/// `r * (1 + k[0] * r² + k[1] * r⁴)`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensProfile {
+    /// Where the left eye's axis meets its picture, seen from the middle:
+    /// right and up. The right eye has it mirrored.
+    pub centre: [f32; 2],
+    /// Coefficients of red, green and blue.
+    pub k: [[f32; 2]; 3],
+}
+
+/// Why a lens profile is refused.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum LensError {
+    /// NaN or infinite.
+    #[error("a number of the lens profile is not finite")]
+    NotFinite,
+    /// The axis is outside of the picture.
+    #[error("the lens centre lies outside of the picture")]
+    Centre,
+    /// More distortion than any lens has.
+    #[error("a lens coefficient lies outside of -2 to 2")]
+    Coefficient,
+}
+
+impl LensProfile {
+    /// No distortion at all; for showing pictures in a window.
+    pub const IDENTITY: Self = Self {
+        centre: [0.0; 2],
+        k: [[0.0; 2]; 3],
+    };
+
+    /// A mild default: 10 % at the edge of the picture, with blue bent a little
+    /// more than red, as glass does.
+    #[must_use]
+    pub fn mild() -> Self {
+        Self {
+            centre: [0.0; 2],
+            k: [[0.076, 0.018], [0.080, 0.020], [0.085, 0.022]],
+        }
+    }
+
+    /// The profile, if a lens can be like that.
+    ///
+    /// # Errors
+    /// When a number is not finite or far from any lens.
+    pub fn checked(self) -> Result<Self, LensError> {
+        let mut numbers = self.centre.iter().chain(self.k.as_flattened());
+        if !numbers.all(|number| number.is_finite()) {
+            return Err(LensError::NotFinite);
+        }
+        if self.centre.iter().any(|offset| offset.abs() > 1.0) {
+            return Err(LensError::Centre);
+        }
+        if self.k.as_flattened().iter().any(|k| k.abs() > 2.0) {
+            return Err(LensError::Coefficient);
+        }
+        Ok(self)
+    }
+}
+
+impl Default for LensProfile {
+    fn default() -> Self {
+        Self::mild()
+    }
+}
+
+/// A rectangle of a target, pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Viewport {
+    /// Left column.
+    pub x: u32,
+    /// Upper row.
+    pub y: u32,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Viewport {
+    /// The left and the right half of a target.
+    #[must_use]
+    pub fn halves([width, height]: [u32; 2]) -> [Self; 2] {
+        let half = width / 2;
+        [0, half].map(|x| Self {
+            x,
+            y: 0,
+            width: half,
+            height,
+        })
+    }
+}
+
+/// As `Lens` in lens.wgsl.
+#[repr(C)]
+#[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+pub(super) struct LensImmediates {
+    pub(super) centre: [f32; 2],
+    pub(super) aspect: f32,
+    pub(super) padding: f32,
+    pub(super) k: [[f32; 2]; 3],
+}
+
+/// Draws both eyes, bent, side by side.
+#[derive(Debug)]
+pub struct LensPass {
+    pipeline: wgpu::RenderPipeline,
+    eyes: [wgpu::BindGroup; 2],
+    aspect: f32,
+    profile: LensProfile,
+}
+
+impl LensPass {
+    /// Bends what is in `source` into targets of `format`.
+    #[must_use]
+    pub fn new(
+        device: &wgpu::Device,
+        source: &EyeImages,
+        format: wgpu::TextureFormat,
+        profile: LensProfile,
+    ) -> Self {
+        let layout = eye_layout(device);
+        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
+            label: Some("lens"),
+            mag_filter: wgpu::FilterMode::Linear,
+            min_filter: wgpu::FilterMode::Linear,
+            ..wgpu::SamplerDescriptor::default()
+        });
+        let eyes = source.layers().each_ref().map(|eye| {
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("lens"),
+                layout: &layout,
+                entries: &[
+                    wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: wgpu::BindingResource::TextureView(eye),
+                    },
+                    wgpu::BindGroupEntry {
+                        binding: 1,
+                        resource: wgpu::BindingResource::Sampler(&sampler),
+                    },
+                ],
+            })
+        });
+        let size = source.texture().size();
+        Self {
+            pipeline: pipeline(device, &layout, format),
+            eyes,
+            aspect: size.width as f32 / size.height as f32,
+            profile,
+        }
+    }
+
+    /// Draws the left and the right eye into their viewports of `target`, and
+    /// black elsewhere.
+    pub fn draw(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &wgpu::TextureView,
+        viewports: [Viewport; 2],
+    ) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("lens"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: target,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        pass.set_pipeline(&self.pipeline);
+        let [x, y] = self.profile.centre;
+        for ((eye, centre), view) in self.eyes.iter().zip([[x, y], [-x, y]]).zip(viewports) {
+            let lens = LensImmediates {
+                centre,
+                aspect: self.aspect,
+                padding: 0.0,
+                k: self.profile.k,
+            };
+            pass.set_viewport(
+                view.x as f32,
+                view.y as f32,
+                view.width as f32,
+                view.height as f32,
+                0.0,
+                1.0,
+            );
+            pass.set_immediates(0, bytemuck::bytes_of(&lens));
+            pass.set_bind_group(0, eye, &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+}
+
+fn eye_layout(device: &wgpu::Device) -> wgpu::BindGroupLayout {
+    device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+        label: Some("lens"),
+        entries: &[
+            wgpu::BindGroupLayoutEntry {
+                binding: 0,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: wgpu::BindingType::Texture {
+                    sample_type: wgpu::TextureSampleType::Float { filterable: true },
+                    view_dimension: wgpu::TextureViewDimension::D2,
+                    multisampled: false,
+                },
+                count: None,
+            },
+            wgpu::BindGroupLayoutEntry {
+                binding: 1,
+                visibility: wgpu::ShaderStages::FRAGMENT,
+                ty: wgpu::BindingType::Sampler(wgpu::SamplerBindingType::Filtering),
+                count: None,
+            },
+        ],
+    })
+}
+
+fn pipeline(
+    device: &wgpu::Device,
+    layout: &wgpu::BindGroupLayout,
+    format: wgpu::TextureFormat,
+) -> wgpu::RenderPipeline {
+    let module = device.create_shader_module(wgpu::include_wgsl!("lens.wgsl"));
+    let layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+        label: Some("lens"),
+        bind_group_layouts: &[Some(layout)],
+        immediate_size: size_of::<LensImmediates>() as u32,
+    });
+    device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+        label: Some("lens"),
+        layout: Some(&layout),
+        vertex: wgpu::VertexState {
+            module: &module,
+            entry_point: Some("cover"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            buffers: &[],
+        },
+        fragment: Some(wgpu::FragmentState {
+            module: &module,
+            entry_point: Some("prewarp"),
+            compilation_options: wgpu::PipelineCompilationOptions::default(),
+            targets: &[Some(format.into())],
+        }),
+        primitive: wgpu::PrimitiveState::default(),
+        depth_stencil: None,
+        multisample: wgpu::MultisampleState::default(),
+        multiview_mask: None,
+        cache: None,
+    })
+}

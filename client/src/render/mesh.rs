@@ -1,0 +1,157 @@
+//! Vertices, indices and transforms on the GPU, in buffers that grow and stay.
+
+use std::sync::Arc;
+
+use glam::Mat4;
+
+use crate::{ClientFrame, DrawVertex};
+
+/// The triangles of the frame that is drawn.
+#[derive(Debug)]
+pub(super) struct Mesh {
+    vertices: Uploaded<DrawVertex>,
+    indices: Uploaded<u32>,
+    transforms: GrowingBuffer,
+    objects: usize,
+}
+
+impl Mesh {
+    pub(super) fn new() -> Self {
+        Self {
+            vertices: Uploaded::new("vertices", wgpu::BufferUsages::VERTEX),
+            indices: Uploaded::new("indices", wgpu::BufferUsages::INDEX),
+            transforms: GrowingBuffer::new("transforms", wgpu::BufferUsages::STORAGE),
+            objects: 0,
+        }
+    }
+
+    /// Bytes of the largest buffer that `frame` needs.
+    pub(super) fn largest_buffer(frame: &ClientFrame) -> u64 {
+        [
+            size_of_val(frame.vertices.as_slice()),
+            size_of_val(frame.indices.as_slice()),
+            frame.transforms.len() * size_of::<Mat4>(),
+        ]
+        .into_iter()
+        .max()
+        .unwrap_or(0) as u64
+    }
+
+    /// Takes over the frame's geometry. True when the transforms have moved to
+    /// another buffer.
+    pub(super) fn upload(
+        &mut self,
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        frame: &ClientFrame,
+    ) -> bool {
+        self.vertices.upload(device, queue, &frame.vertices);
+        self.indices.upload(device, queue, &frame.indices);
+        self.objects = frame.transforms.len();
+        if !self.moves() {
+            return false;
+        }
+        let matrices: Vec<Mat4> = frame.transforms.iter().map(|pose| pose.matrix()).collect();
+        self.transforms
+            .write(device, queue, bytemuck::cast_slice(&matrices))
+    }
+
+    /// True when there is more than the world that stands still.
+    pub(super) fn moves(&self) -> bool {
+        self.objects > 1
+    }
+
+    pub(super) fn transforms(&self) -> Option<&wgpu::Buffer> {
+        self.transforms.buffer.as_ref()
+    }
+
+    /// One draw call over everything.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+        let (Some(vertices), Some(indices)) =
+            (&self.vertices.buffer.buffer, &self.indices.buffer.buffer)
+        else {
+            return;
+        };
+        pass.set_vertex_buffer(0, vertices.slice(..));
+        pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(0..self.indices.count(), 0, 0..1);
+    }
+}
+
+/// A list that is written again only when it is another list.
+#[derive(Debug)]
+struct Uploaded<T> {
+    buffer: GrowingBuffer,
+    content: Option<Arc<Vec<T>>>,
+}
+
+impl<T: bytemuck::NoUninit> Uploaded<T> {
+    fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
+        Self {
+            buffer: GrowingBuffer::new(label, usage),
+            content: None,
+        }
+    }
+
+    fn upload(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, content: &Arc<Vec<T>>) {
+        let same = self
+            .content
+            .as_ref()
+            .is_some_and(|before| Arc::ptr_eq(before, content));
+        if !same {
+            self.buffer
+                .write(device, queue, bytemuck::cast_slice(content));
+            self.content = Some(Arc::clone(content));
+        }
+    }
+
+    fn count(&self) -> u32 {
+        self.content
+            .as_ref()
+            .map_or(0, |content| content.len() as u32)
+    }
+}
+
+/// A buffer that is made anew, half as large again, when it is too small.
+#[derive(Debug)]
+struct GrowingBuffer {
+    label: &'static str,
+    usage: wgpu::BufferUsages,
+    buffer: Option<wgpu::Buffer>,
+}
+
+impl GrowingBuffer {
+    fn new(label: &'static str, usage: wgpu::BufferUsages) -> Self {
+        Self {
+            label,
+            usage,
+            buffer: None,
+        }
+    }
+
+    /// Writes `bytes`, at most the device's largest buffer. True when they are
+    /// in a new buffer.
+    fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, bytes: &[u8]) -> bool {
+        if bytes.is_empty() {
+            return false;
+        }
+        let size = bytes.len() as u64;
+        let grows = self
+            .buffer
+            .as_ref()
+            .is_none_or(|buffer| buffer.size() < size);
+        if grows {
+            let roomy = (size + size / 2).next_multiple_of(256);
+            self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
+                label: Some(self.label),
+                size: roomy.min(device.limits().max_buffer_size & !3),
+                usage: self.usage | wgpu::BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            }));
+        }
+        if let Some(buffer) = &self.buffer {
+            queue.write_buffer(buffer, 0, bytes);
+        }
+        grows
+    }
+}

@@ -1,0 +1,28 @@
+//! Draws the newest [`ClientFrame`](crate::ClientFrame) for two eyes, at any
+//! pose, as often as the display asks.
+//!
+//! The geometry is real and only the shading is streamed: one draw call over
+//! the triangles of all placed patches looks its colour up in the atlas (SAS
+//! 2018, section 3.6). The pose is an argument of every draw, nothing here
+//! reads a clock, and nothing waits for the network. What a frame does not
+//! have (masks, moving objects, a sky, a lens) is not built, bound or drawn.
+
+mod atlas;
+mod eyes;
+mod gpu;
+mod handover;
+mod lens;
+mod mesh;
+mod pipelines;
+mod readback;
+mod renderer;
+mod sky;
+#[cfg(test)]
+mod tests;
+
+pub use eyes::{EyeCamera, EyeImages};
+pub use gpu::{Gpu, GpuError, Stereo};
+pub use handover::{FrameReceiver, FrameSender, frame_channel};
+pub use lens::{LensError, LensPass, LensProfile, Viewport};
+pub use readback::{Pixels, Readback, ReadbackError};
+pub use renderer::{Renderer, RendererConfig, UploadError};

@@ -1,0 +1,295 @@
+//! One turn of drawing: upload what is new, draw both eyes.
+
+use glam::Mat4;
+use shadecast_protocol::Sky;
+use thiserror::Error;
+
+use crate::{ClientFrame, MaskAtlas, YuvPicture};
+
+use super::atlas::Atlas;
+use super::mesh::Mesh;
+use super::pipelines::{DEPTH_FORMAT, Needs, Pipelines};
+use super::sky::SkyPass;
+use super::{EyeCamera, EyeImages, Stereo};
+
+/// What never changes while a renderer lives.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RendererConfig {
+    /// Width and height of one eye's picture, pixels.
+    pub eye_size: [u32; 2],
+    /// What the eyes are drawn into.
+    pub eye_format: wgpu::TextureFormat,
+    /// How both are drawn.
+    pub stereo: Stereo,
+}
+
+/// Why a frame cannot be drawn on this device. The frame before it stays.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum UploadError {
+    /// A plane does not have as many bytes as its size says, or no bytes at all.
+    #[error("the {plane} of a {width}x{height} picture has {bytes} bytes")]
+    Plane {
+        /// Which.
+        plane: &'static str,
+        /// Of the picture, texels.
+        width: u32,
+        /// Of the picture, texels.
+        height: u32,
+        /// What there is.
+        bytes: usize,
+    },
+    /// The picture is larger than the device's textures.
+    #[error("an atlas of {width}x{height} texels is too large for the GPU (at most {limit})")]
+    Atlas {
+        /// Texels.
+        width: u32,
+        /// Texels.
+        height: u32,
+        /// Largest side, texels.
+        limit: u32,
+    },
+    /// The geometry is larger than the device's buffers.
+    #[error("geometry of {bytes} bytes is too large for the GPU (at most {limit})")]
+    Geometry {
+        /// Of the largest list.
+        bytes: u64,
+        /// Largest buffer.
+        limit: u64,
+    },
+}
+
+/// Draws frames into the eyes of a headset.
+#[derive(Debug)]
+pub struct Renderer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    config: RendererConfig,
+    pipelines: Pipelines,
+    atlas: Atlas,
+    mesh: Mesh,
+    objects: Option<wgpu::BindGroup>,
+    sky: Option<SkyPass>,
+    depth: wgpu::TextureView,
+}
+
+impl Renderer {
+    /// A renderer that draws nothing yet.
+    #[must_use]
+    pub fn new(device: &wgpu::Device, queue: &wgpu::Queue, config: RendererConfig) -> Self {
+        Self {
+            device: device.clone(),
+            queue: queue.clone(),
+            config,
+            pipelines: Pipelines::new(device, config.eye_format, config.stereo),
+            atlas: Atlas::new(device, config.eye_format),
+            mesh: Mesh::new(),
+            objects: None,
+            sky: None,
+            depth: depth(device, config),
+        }
+    }
+
+    /// Replaces what is seen where no geometry is; without a sky that is black.
+    pub fn set_sky(&mut self, sky: Option<&Sky>) {
+        self.sky = sky.and_then(|sky| {
+            SkyPass::new(
+                &self.device,
+                &self.queue,
+                &self.pipelines,
+                self.config.eye_format,
+                sky,
+            )
+        });
+    }
+
+    /// Switches to another frame, whole.
+    ///
+    /// # Errors
+    /// When the device cannot hold it; nothing has changed then.
+    pub fn upload(&mut self, frame: &ClientFrame) -> Result<(), UploadError> {
+        check(frame, &self.device.limits())?;
+        let (device, queue) = (&self.device, &self.queue);
+        self.atlas
+            .upload(device, queue, self.pipelines.layouts(), frame);
+        if self.mesh.upload(device, queue, frame) {
+            self.objects = self.mesh.transforms().map(|buffer| {
+                device.create_bind_group(&wgpu::BindGroupDescriptor {
+                    label: Some("objects"),
+                    layout: &self.pipelines.layouts().objects,
+                    entries: &[wgpu::BindGroupEntry {
+                        binding: 0,
+                        resource: buffer.as_entire_binding(),
+                    }],
+                })
+            });
+        }
+        self.pipelines.prepare(device, self.needs());
+        Ok(())
+    }
+
+    /// Draws the left and the right eye into the layers of `target`, which has
+    /// the size and format of the configuration.
+    pub fn draw(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        cameras: [EyeCamera; 2],
+        target: &EyeImages,
+    ) {
+        match self.config.stereo {
+            Stereo::Multiview => self.draw_pass(encoder, cameras, target.array()),
+            Stereo::TwoPass => {
+                for (camera, layer) in cameras.into_iter().zip(target.layers()) {
+                    self.draw_pass(encoder, [camera; 2], layer);
+                }
+            }
+        }
+    }
+
+    fn draw_pass(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        cameras: [EyeCamera; 2],
+        color: &wgpu::TextureView,
+    ) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("eyes"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: color,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &self.depth,
+                depth_ops: Some(wgpu::Operations {
+                    // Reversed Z: zero is infinitely far.
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            multiview_mask: self.config.stereo.mask(),
+            ..wgpu::RenderPassDescriptor::default()
+        });
+        self.draw_patches(&mut pass, cameras.map(EyeCamera::clip_from_world));
+        if let Some(sky) = &self.sky {
+            let rays = cameras.map(EyeCamera::world_ray_from_ndc);
+            sky.draw(&mut pass, bytemuck::bytes_of(&rays));
+        }
+    }
+
+    fn draw_patches(&self, pass: &mut wgpu::RenderPass<'_>, clip_from_world: [Mat4; 2]) {
+        let needs = self.needs();
+        let (Some(pipeline), Some(atlas)) = (self.pipelines.patches(needs), self.atlas.group())
+        else {
+            return;
+        };
+        pass.set_pipeline(pipeline);
+        pass.set_immediates(0, bytemuck::bytes_of(&clip_from_world));
+        pass.set_bind_group(0, atlas, &[]);
+        if needs.objects {
+            pass.set_bind_group(1, self.objects.as_ref(), &[]);
+        }
+        if needs.mask {
+            pass.set_bind_group(2, self.atlas.mask_group(), &[]);
+        }
+        self.mesh.draw(pass);
+    }
+
+    fn needs(&self) -> Needs {
+        Needs {
+            objects: self.mesh.moves(),
+            mask: self.atlas.mask_group().is_some(),
+        }
+    }
+
+    /// The atlas as it was decoded, RGBA8, to be read back; none before the
+    /// first frame.
+    #[must_use]
+    pub fn atlas(&self) -> Option<&wgpu::Texture> {
+        self.atlas.texture()
+    }
+}
+
+fn check(frame: &ClientFrame, limits: &wgpu::Limits) -> Result<(), UploadError> {
+    let YuvPicture {
+        width,
+        height,
+        y,
+        u,
+        v,
+    } = &*frame.picture;
+    let (width, height) = (*width, *height);
+    let limit = limits.max_texture_dimension_2d;
+    if width > limit || height > limit {
+        return Err(UploadError::Atlas {
+            width,
+            height,
+            limit,
+        });
+    }
+    let quarter = (width / 2) as usize * (height / 2) as usize;
+    let whole = quarter * 4;
+    for (plane, bytes, expected) in [
+        ("luma", y.len(), whole),
+        ("blue chroma", u.len(), quarter),
+        ("red chroma", v.len(), quarter),
+    ] {
+        if bytes != expected || bytes == 0 || width % 2 == 1 || height % 2 == 1 {
+            return Err(UploadError::Plane {
+                plane,
+                width,
+                height,
+                bytes,
+            });
+        }
+    }
+    if let Some(MaskAtlas {
+        width: w,
+        height: h,
+        coverage,
+    }) = frame.masks.as_deref()
+        && (coverage.len() != whole || [*w, *h] != [width, height])
+    {
+        return Err(UploadError::Plane {
+            plane: "mask",
+            width,
+            height,
+            bytes: coverage.len(),
+        });
+    }
+    let bytes = Mesh::largest_buffer(frame);
+    let limit = limits.max_buffer_size;
+    if bytes > limit {
+        return Err(UploadError::Geometry { bytes, limit });
+    }
+    Ok(())
+}
+
+/// One depth layer an eye for multiview, and one shared by both passes
+/// otherwise: the left eye is done with it when the right one begins.
+fn depth(device: &wgpu::Device, config: RendererConfig) -> wgpu::TextureView {
+    let layers = match config.stereo {
+        Stereo::Multiview => 2,
+        Stereo::TwoPass => 1,
+    };
+    device
+        .create_texture(&wgpu::TextureDescriptor {
+            label: Some("depth"),
+            size: wgpu::Extent3d {
+                width: config.eye_size[0],
+                height: config.eye_size[1],
+                depth_or_array_layers: layers,
+            },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: DEPTH_FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TRANSIENT,
+            view_formats: &[],
+        })
+        .create_view(&wgpu::TextureViewDescriptor::default())
+}

@@ -1,0 +1,149 @@
+//! Colours arrive as they were encoded, and masks cut holes.
+
+use std::sync::Arc;
+
+use glam::{Vec2, Vec3};
+use shadecast_protocol::Pose;
+
+use super::*;
+use crate::MaskAtlas;
+use crate::render::UploadError;
+
+/// BT.709 in double precision.
+fn expected(yuv: [u8; 3]) -> [u8; 3] {
+    let [y, cb, cr] = yuv.map(f64::from);
+    let (y, cb, cr) = (
+        (y - 16.0) / 219.0,
+        (cb - 128.0) / 224.0,
+        (cr - 128.0) / 224.0,
+    );
+    let (kr, kb) = (0.2126, 0.0722);
+    let red = y + 2.0 * (1.0 - kr) * cr;
+    let blue = y + 2.0 * (1.0 - kb) * cb;
+    let green = (y - kr * red - kb * blue) / (1.0 - kr - kb);
+    [red, green, blue].map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn every_shade_becomes_the_rgb_that_the_standard_gives() {
+    // All luma values along rows; chroma pairs along columns.
+    let color = |x: u32, y: u32| [(x * 2) as u8, (y * 37) as u8, (y * 101 + x) as u8];
+    let frame = Geometry::default().frame(picture(256, color));
+    let bench = Bench::with_frame(&frame);
+    let mut encoder = bench.encoder();
+    let atlas = bench.renderer.atlas().expect("a picture was uploaded");
+    let copy = Readback::record(&bench.gpu.device, &mut encoder, atlas, 0);
+    bench.gpu.queue.submit([encoder.finish()]);
+    let atlas = copy.take(&bench.gpu.device).expect("the device answers");
+    for y in 0..256 {
+        for x in 0..256 {
+            // Single precision may round a tie the other way.
+            assert_close(atlas.at(x, y), expected(color(x / 2, y / 2)), 1);
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn an_srgb_eye_shows_the_same_bytes() {
+    let gpu = gpu(Stereo::TwoPass);
+    let format = wgpu::TextureFormat::Rgba8UnormSrgb;
+    let config = RendererConfig {
+        eye_size: [SIZE; 2],
+        eye_format: format,
+        stereo: Stereo::TwoPass,
+    };
+    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, config);
+    let eyes = EyeImages::new(&gpu.device, [SIZE; 2], format);
+    let grey = [100, 120, 140];
+    let frame = Geometry::default()
+        .whole_quad(Vec3::new(0.0, 0.0, -1.0), 1.0)
+        .frame(picture(16, |_, _| grey));
+    renderer.upload(&frame).expect("a sound frame");
+    let bench = Bench {
+        gpu,
+        renderer,
+        eyes,
+    };
+    assert_close(bench.look(Pose::IDENTITY).at(32, 32), expected(grey), 1);
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn blocks_do_not_bleed_into_each_other() {
+    // Blocks of 2x2 texels in a chequerboard of red and blue, the finest there
+    // is: each is shown large and must be one colour to its edges.
+    let chequered = picture(16, |x, y| if (x + y) % 2 == 0 { RED } else { BLUE });
+    let block = |x: f32, y: f32| {
+        let first = Vec2::new(x, y) * 2.0 + 0.5;
+        [first, first + 1.0]
+    };
+    for (texels, color) in [
+        (block(2.0, 2.0), expected(RED)),
+        (block(3.0, 2.0), expected(BLUE)),
+    ] {
+        let frame = Geometry::default()
+            .quad(Vec3::new(0.0, 0.0, -1.0), 1.0, 0, texels)
+            .frame(chequered.clone());
+        let seen = Bench::with_frame(&frame).look(Pose::IDENTITY);
+        for (x, y) in (0..SIZE).flat_map(|y| (0..SIZE).map(move |x| (x, y))) {
+            assert_close(seen.at(x, y), color, 1);
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_mask_cuts_away_its_texels() {
+    let mut frame = Geometry::default()
+        .whole_quad(Vec3::new(0.0, 0.0, -2.0), 1.0)
+        .frame(four_colors());
+    let coverage = (0..16 * 16)
+        .map(|texel| if texel % 16 < 8 { 0 } else { 255 })
+        .collect();
+    frame.masks = Some(Arc::new(MaskAtlas {
+        width: 16,
+        height: 16,
+        coverage,
+    }));
+    let mut bench = Bench::with_frame(&frame);
+    let seen = bench.look(Pose::IDENTITY);
+    assert_eq!(seen.columns_in_row(20), Some((32, 47)));
+    // The next frame has no mask.
+    frame.masks = None;
+    bench.renderer.upload(&frame).expect("a sound frame");
+    let seen = bench.look(Pose::IDENTITY);
+    assert_eq!(seen.columns_in_row(20), Some((16, 47)));
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_frame_that_the_device_cannot_hold_is_refused_and_the_last_one_stays() {
+    let good = Geometry::default()
+        .whole_quad(Vec3::new(0.0, 0.0, -1.0), 1.0)
+        .frame(picture(16, |_, _| RED));
+    let mut bench = Bench::with_frame(&good);
+    let with_size = |width, height, luma| {
+        let mut frame = good.clone();
+        frame.picture = Arc::new(YuvPicture {
+            width,
+            height,
+            y: vec![0; luma],
+            u: Vec::new(),
+            v: Vec::new(),
+        });
+        frame
+    };
+    for frame in [
+        with_size(0, 0, 0),
+        with_size(16, 16, 10),
+        with_size(3, 3, 4),
+    ] {
+        let refused = bench.renderer.upload(&frame);
+        assert!(matches!(refused, Err(UploadError::Plane { .. })));
+    }
+    let refused = bench.renderer.upload(&with_size(1 << 20, 2, 0));
+    assert!(matches!(refused, Err(UploadError::Atlas { .. })));
+    assert_close(bench.look(Pose::IDENTITY).at(32, 32), [255, 0, 0], 1);
+}

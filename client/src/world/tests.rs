@@ -1,0 +1,341 @@
+//! What a world makes of updates.
+
+mod wrong;
+
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use proptest::prelude::*;
+use shadecast_protocol::{
+    BlockMask, FrameId, Level, MAX_VERTICES, PatchGeometry, PatchShape, Placement, UpdateTiming,
+    Vertex,
+};
+
+use super::*;
+
+fn update(epoch: u32) -> Update {
+    Update {
+        frame: FrameId(0),
+        epoch: Epoch(epoch),
+        timing: UpdateTiming::default(),
+        world_from_head: Pose::IDENTITY,
+        scene_time: 0,
+        vertices: vec![],
+        patches: vec![],
+        removals: vec![],
+        placements: vec![],
+        masks: vec![],
+        transforms: vec![],
+    }
+}
+
+fn vertex(id: u32) -> Vertex {
+    Vertex {
+        id: VertexId(id),
+        position: Vec3::new(id as f32, 0.5, -1.0),
+    }
+}
+
+/// A patch on the vertices from ten times its id on.
+fn patch(id: u32, shape: PatchShape) -> PatchGeometry {
+    let last = shape.corners().len() as u32 - 1;
+    PatchGeometry {
+        id: PatchId(id),
+        object: ObjectId::WORLD,
+        shape,
+        double_sided: false,
+        corners: [0, 1, 2, 3, 4].map(|corner| VertexId(10 * id + corner.min(last))),
+    }
+}
+
+fn placement(id: u32, x: u16, y: u16, log2: [u8; 2]) -> Placement {
+    let level = Level {
+        width: log2[0],
+        height: log2[1],
+    };
+    Placement {
+        patch: PatchId(id),
+        block: Block { x, y, level },
+    }
+}
+
+/// Patches 1 (solo), 2 (pair) and 3 (triple), all placed.
+fn three_patches() -> Update {
+    let shapes = [PatchShape::Solo, PatchShape::Pair, PatchShape::Triple];
+    Update {
+        vertices: (1..=3)
+            .flat_map(|id| (0..5).map(move |corner| vertex(10 * id + corner)))
+            .collect(),
+        patches: (1..).zip(shapes).map(|(id, s)| patch(id, s)).collect(),
+        placements: vec![
+            placement(1, 0, 0, [3, 2]),
+            placement(2, 8, 0, [1, 1]),
+            placement(3, 16, 32, [4, 4]),
+        ],
+        ..update(1)
+    }
+}
+
+fn world() -> World {
+    let mut world = World::new([64, 64]);
+    world.apply(&three_patches()).unwrap();
+    world
+}
+
+fn frame(world: &mut World) -> ClientFrame {
+    let picture = YuvPicture {
+        width: 0,
+        height: 0,
+        y: vec![],
+        u: vec![],
+        v: vec![],
+    };
+    world.frame(&update(1), Arc::new(picture), ClientTiming::default())
+}
+
+#[test]
+fn corners_lie_on_texel_centres_of_their_block() {
+    let frame = frame(&mut world());
+    let texels: Vec<_> = frame.vertices.iter().map(|vertex| vertex.texel).collect();
+    let expected = [
+        // Solo in 8x4 at (0, 0).
+        [0.5, 0.5],
+        [7.5, 0.5],
+        [0.5, 3.5],
+        // Pair in 2x2 at (8, 0).
+        [8.5, 0.5],
+        [9.5, 0.5],
+        [9.5, 1.5],
+        [8.5, 1.5],
+        // Triple in 16x16 at (16, 32).
+        [16.5, 32.5],
+        [24.0, 32.5],
+        [31.5, 32.5],
+        [31.5, 47.5],
+        [16.5, 47.5],
+    ];
+    assert_eq!(texels, expected);
+    let indices = [
+        0, 1, 2, // solo
+        3, 4, 6, 4, 5, 6, // pair
+        7, 8, 11, 8, 10, 11, 8, 9, 10, // triple
+    ];
+    assert_eq!(*frame.indices, indices);
+    assert_eq!(frame.patches, 3);
+    assert_eq!(frame.vertices[3].position, [20.0, 0.5, -1.0]);
+}
+
+#[test]
+fn double_sided_triangles_appear_in_both_windings() {
+    let mut solo = patch(7, PatchShape::Solo);
+    solo.double_sided = true;
+    let update = Update {
+        vertices: vec![vertex(70), vertex(71), vertex(72)],
+        patches: vec![solo],
+        placements: vec![placement(7, 0, 0, [1, 1])],
+        ..update(0)
+    };
+    let mut world = World::new([64, 64]);
+    world.apply(&update).unwrap();
+    assert_eq!(*frame(&mut world).indices, [0, 1, 2, 0, 2, 1]);
+}
+
+#[test]
+fn what_does_not_change_is_shared() {
+    let mut world = world();
+    let first = frame(&mut world);
+    world.apply(&update(1)).unwrap();
+    let second = frame(&mut world);
+    assert!(Arc::ptr_eq(&first.vertices, &second.vertices));
+    assert!(Arc::ptr_eq(&first.indices, &second.indices));
+    assert!(Arc::ptr_eq(&first.transforms, &second.transforms));
+
+    let removal = Update {
+        removals: vec![PatchId(2)],
+        ..update(1)
+    };
+    world.apply(&removal).unwrap();
+    let third = frame(&mut world);
+    assert_eq!((third.patches, third.vertices.len()), (2, 8));
+    assert_eq!(first.vertices.len(), 12, "an older frame stays as it was");
+}
+
+#[test]
+fn a_new_epoch_drops_placements_and_masks_and_keeps_geometry() {
+    let mut world = world();
+    let masked = Update {
+        placements: vec![placement(2, 8, 0, [1, 1])],
+        masks: vec![BlockMask {
+            patch: PatchId(2),
+            bits: vec![0b0110],
+        }],
+        ..update(1)
+    };
+    world.apply(&masked).unwrap();
+    assert!(frame(&mut world).masks.is_some());
+
+    world.apply(&update(2)).unwrap();
+    let empty = frame(&mut world);
+    assert_eq!(world.epoch(), Some(Epoch(2)));
+    assert_eq!((empty.patches, empty.vertices.len()), (0, 0));
+    assert!(empty.masks.is_none());
+
+    let again = Update {
+        placements: vec![placement(3, 0, 0, [2, 2])],
+        ..update(2)
+    };
+    world.apply(&again).unwrap();
+    assert_eq!(frame(&mut world).vertices.len(), 5);
+}
+
+#[test]
+fn masks_cover_their_blocks_and_go_with_them() {
+    let mut world = world();
+    assert!(frame(&mut world).masks.is_none());
+    let masked = Update {
+        placements: vec![placement(2, 62, 10, [1, 1])],
+        masks: vec![BlockMask {
+            patch: PatchId(2),
+            bits: vec![0b0110],
+        }],
+        ..update(1)
+    };
+    world.apply(&masked).unwrap();
+    let masks = frame(&mut world).masks.unwrap();
+    let absent: Vec<_> = (0..64 * 64).filter(|&i| masks.coverage[i] == 0).collect();
+    assert_eq!(absent, [10 * 64 + 62, 11 * 64 + 63]);
+    assert!(Arc::ptr_eq(&masks, &frame(&mut world).masks.unwrap()));
+
+    let moved = Update {
+        placements: vec![placement(2, 0, 20, [1, 1])],
+        ..update(1)
+    };
+    world.apply(&moved).unwrap();
+    assert!(frame(&mut world).masks.is_none());
+}
+
+#[test]
+fn objects_stand_still_until_they_move() {
+    let mut on_object = patch(4, PatchShape::Solo);
+    on_object.object = ObjectId(2);
+    let mut world = world();
+    let update = Update {
+        vertices: vec![vertex(40), vertex(41), vertex(42)],
+        patches: vec![on_object],
+        placements: vec![placement(4, 40, 40, [1, 1])],
+        ..update(1)
+    };
+    world.apply(&update).unwrap();
+    assert_eq!(*frame(&mut world).transforms, [Pose::IDENTITY; 3]);
+    assert_eq!(frame(&mut world).vertices.last().unwrap().object, 2);
+
+    let pose = Pose {
+        position: Vec3::X,
+        orientation: Quat::from_rotation_y(1.0),
+    };
+    let moved = Update {
+        transforms: vec![(ObjectId(2), pose)],
+        ..self::update(1)
+    };
+    world.apply(&moved).unwrap();
+    assert_eq!(frame(&mut world).transforms[2], pose);
+}
+
+#[test]
+fn known_geometry_may_be_sent_again() {
+    let mut world = world();
+    world.apply(&three_patches()).unwrap();
+    assert_eq!(world.positions.len(), 15);
+}
+
+#[test]
+fn learning_takes_geometry_and_leaves_placements() {
+    let mut world = world();
+    let before = frame(&mut world);
+    let skipped = Update {
+        vertices: vec![vertex(50), vertex(51), vertex(52)],
+        patches: vec![patch(5, PatchShape::Solo)],
+        removals: vec![PatchId(1)],
+        placements: vec![placement(5, 0, 0, [1, 1])],
+        ..update(9)
+    };
+    world.learn(&skipped).unwrap();
+    assert_eq!(world.epoch(), Some(Epoch(1)));
+    assert_eq!(frame(&mut world).vertices, before.vertices);
+    let placed = Update {
+        placements: vec![placement(5, 0, 0, [1, 1])],
+        ..update(10)
+    };
+    world.apply(&placed).unwrap();
+}
+
+proptest! {
+    /// Whatever order patches come and go in, what is drawn is a function of
+    /// what is placed.
+    #[test]
+    fn what_is_drawn_does_not_depend_on_history(
+        steps in prop::collection::vec((1_u32..20, any::<bool>()), 0..60),
+    ) {
+        let geometry = Update {
+            vertices: (1..20).flat_map(|id| (0..3).map(move |c| vertex(10 * id + c))).collect(),
+            patches: (1..20).map(|id| patch(id, PatchShape::Solo)).collect(),
+            ..update(0)
+        };
+        let place = |id: u32| placement(id, 2 * id as u16, 4, [1, 1]);
+        let mut world = World::new([64, 64]);
+        world.apply(&geometry).unwrap();
+        let mut placed = std::collections::BTreeSet::new();
+        for (id, is_placed) in steps {
+            let mut step = update(0);
+            if is_placed {
+                placed.insert(id);
+                step.placements.push(place(id));
+            } else if placed.remove(&id) {
+                step.removals.push(PatchId(id));
+            }
+            world.apply(&step).unwrap();
+            let _ = frame(&mut world);
+        }
+        let mut at_once = World::new([64, 64]);
+        let placements = placed.iter().map(|&id| place(id)).collect();
+        at_once.apply(&Update { placements, ..geometry }).unwrap();
+        let (a, b) = (frame(&mut world), frame(&mut at_once));
+        prop_assert_eq!(a.vertices.iter().map(|v| v.texel).collect::<Vec<_>>(),
+            b.vertices.iter().map(|v| v.texel).collect::<Vec<_>>());
+        prop_assert_eq!(&a.vertices, &b.vertices);
+        prop_assert_eq!(a.indices, b.indices);
+    }
+}
+
+/// `cargo test -p shadecast-client ten_thousand -- --ignored --nocapture`
+#[test]
+#[ignore = "a benchmark: prints how long it took"]
+fn ten_thousand_patches() {
+    let count = 10_000;
+    let all = Update {
+        vertices: (0..count)
+            .flat_map(|id| (0..4).map(move |corner| vertex(10 * id + corner)))
+            .collect(),
+        patches: (0..count).map(|id| patch(id, PatchShape::Pair)).collect(),
+        placements: (0..count)
+            .map(|id| placement(id, (id % 500 * 4) as u16, (id / 500 * 4) as u16, [2, 2]))
+            .collect(),
+        ..update(0)
+    };
+    let mut world = World::new([2048, 2048]);
+    let start = std::time::Instant::now();
+    world.apply(&all).unwrap();
+    let applied = start.elapsed();
+    let first = frame(&mut world);
+    println!("apply {applied:?}, build {:?}", start.elapsed() - applied);
+    assert_eq!(first.vertices.len(), 40_000);
+    let one = Update {
+        removals: vec![PatchId(77)],
+        ..update(0)
+    };
+    let start = std::time::Instant::now();
+    world.apply(&one).unwrap();
+    let second = frame(&mut world);
+    println!("apply and build again {:?}", start.elapsed());
+    assert_eq!(second.vertices.len(), 39_996);
+}

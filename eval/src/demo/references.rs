@@ -1,0 +1,161 @@
+//! Path-traced pictures at the poses at which the client drew.
+//!
+//! A reference is the mean of two halves with different seeds. What differs
+//! between the halves is noise alone, so that the difference says how noisy
+//! the reference itself is.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result};
+use glam::Vec3;
+use image::{Rgb, RgbImage};
+use shadecast_server::{
+    scene::Scene,
+    still::{Camera, Still, StillRenderer},
+    tone_map,
+};
+
+use crate::{MetricError, mean_squared_error};
+
+/// Fewest samples a pixel of one half, even on a machine that is too slow for
+/// them.
+const MIN_SAMPLES: u32 = 4;
+/// Most: beyond, the noise is below one level of eight bits.
+const MAX_SAMPLES: u32 = 1024;
+/// Samples a pixel by which the speed is measured.
+const PROBE_SAMPLES: u32 = 2;
+
+/// Renders references with as many samples as a deadline allows.
+pub(super) struct References {
+    renderer: StillRenderer,
+    exposure: f32,
+    seed: u32,
+    deadline: Instant,
+    /// Of one half; chosen by [`Self::plan`].
+    samples: u32,
+}
+
+impl References {
+    pub(super) fn new(scene: &Scene, exposure: f32, seed: u32, deadline: Instant) -> Result<Self> {
+        Ok(Self {
+            renderer: StillRenderer::new(scene).context("cannot render references")?,
+            exposure,
+            seed,
+            deadline,
+            samples: MIN_SAMPLES,
+        })
+    }
+
+    /// Chooses the samples so that `count` references as seen by `camera` end
+    /// in time.
+    pub(super) fn plan(&mut self, camera: &Camera, count: usize) -> Result<()> {
+        // The first dispatch compiles the kernel; the second one shows its speed.
+        self.renderer.render(camera, Duration::ZERO, 1, self.seed)?;
+        let began = Instant::now();
+        self.renderer
+            .render(camera, Duration::ZERO, PROBE_SAMPLES, self.seed)?;
+        let one_sample = began.elapsed() / PROBE_SAMPLES;
+        let left = self.deadline.saturating_duration_since(Instant::now());
+        self.samples = samples_that_fit(left, one_sample, 2 * count);
+        Ok(())
+    }
+
+    /// Of a whole reference, both halves.
+    pub(super) fn samples_per_pixel(&self) -> u32 {
+        2 * self.samples
+    }
+
+    /// The `index`-th reference; `progress` hears of each half.
+    pub(super) fn render(
+        &mut self,
+        index: u32,
+        camera: &Camera,
+        scene_time: Duration,
+        progress: impl Fn(),
+    ) -> Result<Reference> {
+        let mut half = |seed: u32| {
+            let still = self
+                .renderer
+                .render(camera, scene_time, self.samples, seed)?;
+            progress();
+            anyhow::Ok(still)
+        };
+        let first_seed = self.seed.wrapping_add(2 * index);
+        let halves = [half(first_seed)?, half(first_seed.wrapping_add(1))?];
+        Ok(Reference::new(&halves, self.exposure))
+    }
+}
+
+fn samples_that_fit(left: Duration, one_sample: Duration, halves: usize) -> u32 {
+    let samples = left.as_secs_f64() / (one_sample.as_secs_f64() * halves as f64).max(1e-9);
+    (samples as u32).clamp(MIN_SAMPLES, MAX_SAMPLES)
+}
+
+/// A tone-mapped reference and its two tone-mapped halves.
+pub(super) struct Reference {
+    pub(super) picture: RgbImage,
+    halves: [RgbImage; 2],
+}
+
+impl Reference {
+    fn new([one, other]: &[Still; 2], exposure: f32) -> Self {
+        let mean = one
+            .radiance
+            .iter()
+            .zip(&other.radiance)
+            .map(|(a, b)| (*a + *b) * 0.5);
+        Self {
+            picture: tone_mapped(one.width, mean, exposure),
+            halves: [one, other]
+                .map(|still| tone_mapped(still.width, still.radiance.iter().copied(), exposure)),
+        }
+    }
+
+    /// The mean squared error that noise gives the reference: a quarter of that
+    /// between its halves, whose variances add up while those of their mean do not.
+    pub(super) fn noise(&self) -> Result<f64, MetricError> {
+        Ok(mean_squared_error(&self.halves[0], &self.halves[1])? / 4.0)
+    }
+}
+
+fn tone_mapped(
+    width: u32,
+    radiance: impl ExactSizeIterator<Item = Vec3>,
+    exposure: f32,
+) -> RgbImage {
+    let height = radiance.len() as u32 / width.max(1);
+    let mut picture = RgbImage::new(width, height);
+    for (pixel, radiance) in picture.pixels_mut().zip(radiance) {
+        *pixel = Rgb(tone_map(radiance, exposure));
+    }
+    picture
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_fill_the_time_within_bounds() {
+        let second = Duration::from_secs(1);
+        let millisecond = Duration::from_millis(1);
+        assert_eq!(samples_that_fit(40 * second, 20 * millisecond, 48), 41);
+        assert_eq!(samples_that_fit(Duration::ZERO, second, 48), MIN_SAMPLES);
+        assert_eq!(
+            samples_that_fit(40 * second, Duration::ZERO, 48),
+            MAX_SAMPLES
+        );
+    }
+
+    #[test]
+    fn the_noise_of_a_mean_is_half_the_difference() {
+        let grey = |level| RgbImage::from_pixel(4, 4, Rgb([level; 3]));
+        let reference = Reference {
+            picture: grey(100),
+            halves: [grey(90), grey(110)],
+        };
+        // Halves at a distance of 20 levels stand for a deviation of 10.
+        let noise = reference.noise().unwrap();
+        assert!((noise.sqrt() * 255.0 - 10.0).abs() < 1e-9, "{noise}");
+    }
+}

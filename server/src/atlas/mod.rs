@@ -1,0 +1,120 @@
+//! Where in the atlas each visible patch is shaded.
+//!
+//! A patch keeps its block while its level is unchanged, so that the video
+//! encoder sees a still picture and a path tracer may go on accumulating
+//! wherever shading is still. Once a frame, [`Atlas::place`] chooses levels
+//! that fit (`choice`), then allocates in three phases: *request* (blocks come
+//! back, new ones are counted), *provisioning* (room is found for each level)
+//! and *assignment* (each patch gets its block).
+//!
+//! Free blocks are never merged, so that memory fragments until an **atlas
+//! reset** drops all of it and places anew, largest blocks first: a new epoch,
+//! which the caller starts on an IDR picture. Levels are chosen to fill only
+//! [`FILL_TARGET`] of an empty atlas; what is left over is worn away by
+//! changes of view and is what spaces resets apart. Where resets come too
+//! soon all the same, the target falls: the bias rises and pictures get
+//! coarser, rather than every picture becoming an IDR.
+//!
+//! Source: Mueller et al., "Shading Atlas Streaming", 2018, sections 4.2 and
+//! 4.3. We differ in keeping blocks of patches that have just gone out of
+//! sight until their room is needed ([`KEEP_UNSEEN`]): rasterised visibility
+//! flickers on small patches, and accumulated light should survive a flicker.
+
+mod bias;
+mod choice;
+mod level;
+mod place;
+mod superblocks;
+#[cfg(test)]
+mod tests;
+
+use shadecast_protocol::{Block, Epoch, PatchId, Placement};
+use thiserror::Error;
+
+pub use bias::bias;
+pub use level::{HYSTERESIS, IdealSize, edge_pixels, ideal_size, level, steady_level};
+pub use place::{Atlas, FILL_TARGET, KEEP_UNSEEN};
+
+/// A visible patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Request {
+    /// Which; a patch that is listed twice counts once.
+    pub patch: PatchId,
+    /// What it deserves.
+    pub ideal: IdealSize,
+    /// Visible pixels: what to keep where even the smallest blocks are too many.
+    pub importance: f32,
+}
+
+/// Why there is no such atlas.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+pub enum AtlasError {
+    /// The superblock's side cannot be halved down to a block's.
+    #[error("a superblock of {0} texels: the side must be a power of two, at least 4")]
+    Superblock(u16),
+    /// The superblocks do not tile the atlas.
+    #[error(
+        "an atlas of {}x{} texels: both sides must be positive multiples of the superblock, {superblock}",
+        size[0], size[1]
+    )]
+    Size {
+        /// Width and height, texels.
+        size: [u16; 2],
+        /// Side of a superblock, texels.
+        superblock: u16,
+    },
+}
+
+/// What one call of [`Atlas::place`] changed. All lists ascend by patch.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Placed {
+    /// The epoch that the placement belongs to.
+    pub epoch: Epoch,
+    /// True when the epoch begins with this call: nothing that was placed
+    /// before is any longer, and the picture must be an IDR.
+    pub reset: bool,
+    /// Patches that lose their block. Empty on a reset, which drops all.
+    pub removals: Vec<PatchId>,
+    /// Patches that get a block; on a reset, all that have one.
+    pub placements: Vec<Placement>,
+    /// Those among the placements that had a block before: old one, new one.
+    /// After a reset the two may be equal.
+    pub moved: Vec<(PatchId, Block, Block)>,
+    /// Subtracted from log2 of all ideal areas.
+    pub bias: f32,
+    /// Visible patches without a block, the least important ones.
+    pub unplaced: u32,
+    /// The atlas after the call.
+    pub stats: AtlasStats,
+}
+
+/// How full an atlas is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AtlasStats {
+    /// Texels of the atlas.
+    pub texels: u64,
+    /// Texels in blocks of patches.
+    pub used_texels: u64,
+    /// Texels in free blocks on the stacks.
+    pub stacked_texels: u64,
+    /// Texels at the ends of partly filled superblocks.
+    pub tail_texels: u64,
+    /// Superblocks, free or not.
+    pub superblocks: u32,
+    /// Superblocks without any block.
+    pub free_superblocks: u32,
+    /// Free blocks on the stacks.
+    pub stacked_blocks: u32,
+    /// Patches that have a block.
+    pub patches: u32,
+    /// Atlas resets so far.
+    pub resets: u32,
+}
+
+impl AtlasStats {
+    /// Share of the texels that are in blocks of patches.
+    #[must_use]
+    pub fn used_fraction(&self) -> f32 {
+        self.used_texels as f32 / self.texels as f32
+    }
+}

@@ -1,0 +1,309 @@
+//! One frame of the server, from top to bottom: what may be seen, where it
+//! lies in the atlas, how it is lit, and what the client must be told.
+//!
+//! Source: SAS 2018, section 3 and figure 2.
+
+use std::time::Duration;
+
+use shadecast_protocol::{FrameId, Picture, Pose, Update, UpdateTiming};
+
+use crate::{
+    atlas::{Atlas, AtlasError, AtlasStats, Request, ideal_size},
+    encode::{EncodeError, VideoEncoder},
+    gpu::{Gpu, GpuError, GpuScene},
+    known::Known,
+    light::{Light, Schedule},
+    patches::{Patch, PatchedScene},
+    picture::PictureConversion,
+    scene::{Material, Scene},
+    visibility::{Prediction, Visibility, VisiblePatch, eye_of},
+};
+
+/// Samples over which a diffuse texel's mean runs at most: beyond it the error
+/// is below a code value of the video.
+const LONGEST_HISTORY: f32 = 4096.0;
+/// The same where the head's motion changes what is seen in the surface.
+const GLOSSY_HISTORY: f32 = 8.0;
+/// Roughness above which a dielectric's highlight is as good as diffuse.
+const ROUGH: f32 = 0.5;
+
+/// What a frame is made for.
+#[derive(Clone, Debug)]
+pub struct FrameOrder {
+    /// Its name.
+    pub frame: FrameId,
+    /// Where the head may be while it is shown.
+    pub prediction: Prediction,
+    /// Where moving objects are.
+    pub scene_time: Duration,
+    /// Paths that may be traced.
+    pub paths: u32,
+    /// Begin a new epoch.
+    pub reset: bool,
+    /// The client knows nothing yet.
+    pub new_client: bool,
+    /// Goes into the update; `finished` is filled in when it is sent.
+    pub timing: UpdateTiming,
+}
+
+/// A picture, its update, and what making them was like.
+#[derive(Clone, Debug)]
+pub struct Frame {
+    /// For the client.
+    pub update: Update,
+    /// For the client.
+    pub picture: Picture,
+    /// For the report.
+    pub stats: FrameStats,
+}
+
+/// What a frame was like.
+#[derive(Clone, Debug)]
+pub struct FrameStats {
+    /// Time of each stage.
+    pub stages: Stages,
+    /// Size of the potentially visible set.
+    pub visible: u32,
+    /// Patches that it had no room for.
+    pub unplaced: u32,
+    /// Subtracted from log2 of all areas.
+    pub bias: f32,
+    /// The atlas after the frame.
+    pub atlas: AtlasStats,
+    /// Paths traced.
+    pub paths: u32,
+}
+
+/// Where a frame's time went.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Stages {
+    /// Id pictures and marking.
+    pub visibility: Duration,
+    /// Levels and blocks.
+    pub atlas: Duration,
+    /// Path tracing.
+    pub light: Duration,
+    /// Tone curve and colour conversion.
+    pub picture: Duration,
+    /// Video.
+    pub encode: Duration,
+}
+
+/// Why a frame or a server could not be made.
+#[derive(Debug, thiserror::Error)]
+pub enum FrameError {
+    /// The GPU failed.
+    #[error(transparent)]
+    Gpu(#[from] GpuError),
+    /// The encoder failed.
+    #[error(transparent)]
+    Encode(#[from] EncodeError),
+    /// The atlas cannot be as asked.
+    #[error(transparent)]
+    Atlas(#[from] AtlasError),
+}
+
+/// Everything that outlives a frame.
+pub struct Pipeline {
+    gpu: Gpu,
+    gpu_scene: GpuScene,
+    scene: PatchedScene,
+    visibility: Visibility,
+    atlas: Atlas,
+    schedule: Schedule,
+    light: Light,
+    picture: PictureConversion,
+    encoder: Box<dyn VideoEncoder>,
+    known: Known,
+    exposure: f32,
+}
+
+impl Pipeline {
+    /// A server of `scene` with an atlas of `size` texels.
+    ///
+    /// # Errors
+    /// When the atlas is impossible or does not fit the device.
+    pub fn new(
+        gpu: Gpu,
+        gpu_scene: GpuScene,
+        scene: PatchedScene,
+        size: [u16; 2],
+        superblock: u16,
+        encoder: Box<dyn VideoEncoder>,
+        exposure: f32,
+    ) -> Result<Self, FrameError> {
+        let atlas = Atlas::new(size, superblock)?;
+        let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
+        let light = Light::new(&gpu, &gpu_scene, size)?;
+        let picture = PictureConversion::new(&gpu, light.radiance(), size)?;
+        let histories = scene
+            .patches
+            .iter()
+            .map(|patch| longest_history(&scene.scene, patch))
+            .collect();
+        Ok(Self {
+            known: Known::nothing(&scene),
+            schedule: Schedule::new(histories),
+            gpu,
+            gpu_scene,
+            scene,
+            visibility,
+            atlas,
+            light,
+            picture,
+            encoder,
+            exposure,
+        })
+    }
+
+    /// The scene and its patches.
+    #[must_use]
+    pub fn scene(&self) -> &PatchedScene {
+        &self.scene
+    }
+
+    /// Makes a frame. `clock` tells the time for the stages' durations, and
+    /// nothing depends on it.
+    ///
+    /// # Errors
+    /// When the GPU or the encoder fails. What the client was to be told is
+    /// then lost: the next order must ask for a reset and a new client.
+    pub fn frame(
+        &mut self,
+        order: &FrameOrder,
+        clock: &dyn Fn() -> Duration,
+    ) -> Result<Frame, FrameError> {
+        let mut stages = Stages::default();
+        let mut since = clock();
+        let mut lap = || {
+            let now = clock();
+            now.saturating_sub(std::mem::replace(&mut since, now))
+        };
+        if order.new_client {
+            self.known = Known::nothing(&self.scene);
+        }
+        if order.reset || order.new_client {
+            self.atlas.force_reset();
+        }
+        let poses: Vec<Pose> = (self.scene.scene.objects.iter())
+            .map(|object| object.world_from_object(order.scene_time))
+            .collect();
+        self.gpu_scene.set_poses(&self.gpu, &poses);
+
+        let visible =
+            self.visibility
+                .potential(&self.gpu, &self.gpu_scene, &order.prediction, &poses)?;
+        stages.visibility = lap();
+
+        let placed = self
+            .atlas
+            .place(&self.requests(&visible, &order.prediction, &poses));
+        let mut moved = placed.moved.iter().peekable();
+        for placement in &placed.placements {
+            let old = moved.next_if(|(patch, ..)| *patch == placement.patch);
+            let resized = old.is_some_and(|(_, old, new)| old.level != new.level);
+            self.schedule
+                .placed(placement.patch, old.is_some(), resized);
+        }
+        let news = self.known.news(&self.scene, &placed.placements, &poses);
+        stages.atlas = lap();
+
+        let lit = visible.iter().filter_map(|patch| {
+            Some((patch.patch, self.atlas.block_of(patch.patch)?, patch.pixels))
+        });
+        let jobs = self.schedule.choose(&self.scene.patches, lit, order.paths);
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.light.record_moves(&self.gpu, &mut encoder, &placed)?;
+        self.gpu.queue.submit([encoder.finish()]);
+        let eye = eye_of(&order.prediction);
+        let noise = self.light.trace(&self.gpu, &self.gpu_scene, &jobs, eye)?;
+        self.schedule.traced(&jobs, &noise);
+        stages.light = lap();
+
+        let mut encoder = self
+            .gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.picture.record(&self.gpu, &mut encoder, self.exposure);
+        let planes = self.picture.read(&self.gpu, encoder)?;
+        stages.picture = lap();
+
+        let encoded = self.encoder.encode(&planes, placed.reset)?;
+        stages.encode = lap();
+
+        Ok(Frame {
+            update: Update {
+                frame: order.frame,
+                epoch: placed.epoch,
+                timing: order.timing,
+                world_from_head: order.prediction.view.world_from_head,
+                scene_time: order.scene_time.as_nanos() as u64,
+                vertices: news.vertices,
+                patches: news.patches,
+                removals: placed.removals,
+                placements: placed.placements,
+                masks: news.masks,
+                transforms: news.transforms,
+            },
+            picture: Picture {
+                frame: order.frame,
+                epoch: placed.epoch,
+                idr: encoded.idr,
+                bytes: encoded.bytes,
+            },
+            stats: FrameStats {
+                stages,
+                visible: visible.len() as u32,
+                unplaced: placed.unplaced,
+                bias: placed.bias,
+                atlas: placed.stats,
+                paths: jobs.iter().map(crate::light::Job::paths).sum(),
+            },
+        })
+    }
+
+    /// What each visible patch deserves, measured from between the eyes.
+    fn requests(
+        &self,
+        visible: &[VisiblePatch],
+        prediction: &Prediction,
+        poses: &[Pose],
+    ) -> Vec<Request> {
+        let eye = eye_of(prediction);
+        let pixels_per_radian = prediction.pixels_per_radian();
+        visible
+            .iter()
+            .map(|visible| {
+                let patch = &self.scene.patches[visible.patch.0 as usize];
+                let eye_in_object = match (patch.object.0 as usize).checked_sub(1) {
+                    None => eye,
+                    Some(object) => poses[object].inverse().transform_point(eye),
+                };
+                let corners = patch
+                    .corners
+                    .map(|corner| self.scene.scene.positions[corner as usize]);
+                Request {
+                    patch: visible.patch,
+                    ideal: ideal_size(patch.shape, &corners, eye_in_object, pixels_per_radian),
+                    importance: visible.pixels as f32,
+                }
+            })
+            .collect()
+    }
+}
+
+/// A mirror's image moves with the head, so its history must be short.
+fn longest_history(scene: &Scene, patch: &Patch) -> f32 {
+    let material: &Material =
+        &scene.materials[scene.triangles[patch.first_triangle as usize].material as usize];
+    let glossy =
+        material.roughness < ROUGH || (material.metallic > 0.5 && material.roughness < 0.8);
+    if glossy && material.metallic_roughness_texture.is_none() || patch.object.0 != 0 {
+        GLOSSY_HISTORY
+    } else {
+        LONGEST_HISTORY
+    }
+}

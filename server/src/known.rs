@@ -1,0 +1,80 @@
+//! What the client already knows, and so what an update must tell it.
+
+use shadecast_protocol::{
+    BlockMask, ObjectId, PatchGeometry, PatchId, Placement, Pose, Vertex, VertexId,
+};
+
+use crate::{mask::block_mask, patches::PatchedScene};
+
+/// The client's copy of the scene, as far as updates have told it.
+#[derive(Clone, Debug)]
+pub struct Known {
+    vertices: Vec<bool>,
+    patches: Vec<bool>,
+    poses: Vec<Pose>,
+}
+
+/// The geometry of an update: see [`Update`](shadecast_protocol::Update).
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct News {
+    /// New to the client, by ascending id.
+    pub vertices: Vec<Vertex>,
+    /// New to the client, by ascending id.
+    pub patches: Vec<PatchGeometry>,
+    /// Of the alpha-masked patches that were placed.
+    pub masks: Vec<BlockMask>,
+    /// Of the objects that moved.
+    pub transforms: Vec<(ObjectId, Pose)>,
+}
+
+impl Known {
+    /// A client that knows nothing.
+    #[must_use]
+    pub fn nothing(scene: &PatchedScene) -> Self {
+        Self {
+            vertices: vec![false; scene.scene.positions.len()],
+            patches: vec![false; scene.patches.len()],
+            poses: vec![Pose::IDENTITY; scene.scene.objects.len()],
+        }
+    }
+
+    /// What the client must be told so that `placements` mean something to it;
+    /// `poses[n]` is `world_from_object` of `ObjectId(n + 1)`.
+    pub fn news(&mut self, scene: &PatchedScene, placements: &[Placement], poses: &[Pose]) -> News {
+        let mut news = News::default();
+        for placement in placements {
+            let PatchId(id) = placement.patch;
+            let patch = &scene.patches[id as usize];
+            if patch.masked {
+                news.masks.push(block_mask(&scene.scene, patch, *placement));
+            }
+            if std::mem::replace(&mut self.patches[id as usize], true) {
+                continue;
+            }
+            for corner in patch.corners {
+                if !std::mem::replace(&mut self.vertices[corner as usize], true) {
+                    let position = scene.scene.positions[corner as usize];
+                    news.vertices.push(Vertex {
+                        id: VertexId(corner),
+                        position,
+                    });
+                }
+            }
+            news.patches.push(PatchGeometry {
+                id: placement.patch,
+                object: patch.object,
+                shape: patch.shape,
+                double_sided: patch.double_sided,
+                corners: patch.corners.map(VertexId),
+            });
+        }
+        news.vertices.sort_by_key(|vertex| vertex.id);
+        for ((object, known), &pose) in (1..).map(ObjectId).zip(&mut self.poses).zip(poses) {
+            if *known != pose {
+                *known = pose;
+                news.transforms.push((object, pose));
+            }
+        }
+        news
+    }
+}

@@ -1,0 +1,24 @@
+//! The shadecast server: from a scene on the workstation to encoded pictures
+//! and updates for a headset.
+//!
+//! Read `frame.rs` first: one frame from top to bottom.
+
+pub mod atlas;
+pub mod encode;
+mod frame;
+mod gpu;
+mod known;
+mod light;
+mod mask;
+pub mod patches;
+mod picture;
+pub mod scene;
+mod session;
+pub mod still;
+mod visibility;
+
+pub use frame::{Frame, FrameError, FrameOrder, FrameStats, Pipeline, Stages};
+pub use gpu::{Gpu, GpuError, GpuScene};
+pub use session::{Input, Output, Session, SessionConfig};
+pub use shadecast_shaders::picture::displayed as tone_map;
+pub use visibility::Prediction;

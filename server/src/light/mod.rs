@@ -1,0 +1,260 @@
+//! Path-traced radiance at the texels of placed patches.
+//!
+//! Radiance lives in object space and linear HDR. A texel's mean grows sample
+//! by sample while its block stands still; what moves to another block is
+//! resampled. Each update has a budget of paths, spent where it is needed most.
+//!
+//! Source: SAS 2018, section 3.2; the accumulation and the budget are ours.
+
+mod paths;
+mod schedule;
+
+use glam::Vec3;
+use shadecast_protocol::Block;
+use shadecast_shaders::light::{
+    ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CarryParameters, LightParameters, Move, NO_BLOCK,
+};
+use wgpu::ShaderStages;
+
+use crate::{
+    atlas::Placed,
+    gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout, workgroups},
+};
+
+pub use paths::{Ends, Paths};
+pub use schedule::{Job, Schedule};
+
+/// Most blocks that are lit or moved by one update.
+const MOST_BLOCKS: u64 = 1 << 18;
+
+/// The accumulated radiance and the kernels that make it.
+#[derive(Debug)]
+pub struct Light {
+    atlas_width: u32,
+    radiance: wgpu::Buffer,
+    radiance_before: Option<wgpu::Buffer>,
+    squares: wgpu::Buffer,
+    squares_before: Option<wgpu::Buffer>,
+    parameters: wgpu::Buffer,
+    blocks: wgpu::Buffer,
+    noise: wgpu::Buffer,
+    noise_readback: wgpu::Buffer,
+    paths: Paths,
+    start: wgpu::ComputePipeline,
+    accumulate: wgpu::ComputePipeline,
+    measure: wgpu::ComputePipeline,
+    group: wgpu::BindGroup,
+    carry: wgpu::ComputePipeline,
+    carry_layout: wgpu::BindGroupLayout,
+    carry_parameters: wgpu::Buffer,
+    moves: wgpu::Buffer,
+}
+
+impl Light {
+    /// An atlas of `size` texels, all unlit.
+    ///
+    /// # Errors
+    /// When the atlas is larger than the device binds.
+    pub fn new(gpu: &Gpu, gpu_scene: &GpuScene, size: [u16; 2]) -> Result<Self, GpuError> {
+        let texels = u64::from(size[0]) * u64::from(size[1]);
+        let most_blocks = MOST_BLOCKS.min(texels / 4).max(1);
+        let own_layout = layout(
+            gpu,
+            ShaderStages::COMPUTE,
+            &[
+                Binding::Uniform,
+                Binding::Read,
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+            ],
+        );
+        let radiance = gpu.scratch("radiance", texels * 16)?;
+        let squares = gpu.scratch("squares", texels * 4)?;
+        let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
+        let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
+        let noise = gpu.scratch("noise", most_blocks * 4)?;
+        let group = bind(
+            gpu,
+            &own_layout,
+            &[&parameters, &blocks, &radiance, &squares, &noise],
+        );
+        let paths = Paths::new(gpu, gpu_scene, texels as u32)?;
+        let layouts = [&gpu_scene.layout, &paths.layout, &own_layout];
+        let pipeline =
+            |entry| gpu.compute_pipeline(ATLAS_SOURCE, entry, &layouts, &gpu_scene.constants);
+        let carry_layout = layout(
+            gpu,
+            ShaderStages::COMPUTE,
+            &[
+                Binding::Uniform,
+                Binding::Read,
+                Binding::Read,
+                Binding::Read,
+                Binding::Write,
+                Binding::Write,
+            ],
+        );
+        Ok(Self {
+            atlas_width: u32::from(size[0]),
+            start: pipeline("start_at_texels"),
+            accumulate: pipeline("accumulate"),
+            measure: pipeline("measure_noise"),
+            paths,
+            carry: gpu.compute_pipeline(CARRY_SOURCE, "carry_blocks", &[&carry_layout], &[]),
+            carry_layout,
+            carry_parameters: gpu.uniform("carry parameters", size_of::<CarryParameters>()),
+            moves: gpu.scratch("moves", most_blocks * size_of::<Move>() as u64)?,
+            radiance,
+            radiance_before: None,
+            squares,
+            squares_before: None,
+            parameters,
+            blocks,
+            noise_readback: gpu.readback("noise", most_blocks * 4),
+            noise,
+            group,
+        })
+    }
+
+    /// The mean radiance and its weight, four floats a texel, row by row.
+    #[must_use]
+    pub fn radiance(&self) -> &wgpu::Buffer {
+        &self.radiance
+    }
+
+    /// Gives the blocks of `placed` their first content, and clears the atlas on a reset.
+    ///
+    /// # Errors
+    /// When the device has no room for the copy that moving needs.
+    pub fn record_moves(
+        &mut self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        placed: &Placed,
+    ) -> Result<(), GpuError> {
+        let mut moves: Vec<Move> = Vec::with_capacity(placed.placements.len());
+        let mut moved = placed.moved.iter().peekable();
+        for placement in &placed.placements {
+            let old = moved
+                .next_if(|(patch, ..)| *patch == placement.patch)
+                .map(|(_, old, _)| *old);
+            moves.push(move_record(placement.block, old));
+        }
+        moves.truncate((self.moves.size() / size_of::<Move>() as u64) as usize);
+        let carries = moves.iter().any(|m| m.origin != NO_BLOCK);
+        if carries && self.radiance_before.is_none() {
+            self.radiance_before = Some(gpu.scratch("radiance before", self.radiance.size())?);
+            self.squares_before = Some(gpu.scratch("squares before", self.squares.size())?);
+        }
+        if let (true, Some(radiance), Some(squares)) =
+            (carries, &self.radiance_before, &self.squares_before)
+        {
+            encoder.copy_buffer_to_buffer(&self.radiance, 0, radiance, 0, None);
+            encoder.copy_buffer_to_buffer(&self.squares, 0, squares, 0, None);
+        }
+        if placed.reset {
+            encoder.clear_buffer(&self.radiance, 0, None);
+            encoder.clear_buffer(&self.squares, 0, None);
+        }
+        if moves.is_empty() {
+            return Ok(());
+        }
+        gpu.queue
+            .write_buffer(&self.moves, 0, bytemuck::cast_slice(&moves));
+        let parameters = CarryParameters {
+            move_count: moves.len() as u32,
+            atlas_width: self.atlas_width,
+            padding: [0; 2],
+        };
+        gpu.queue
+            .write_buffer(&self.carry_parameters, 0, bytemuck::bytes_of(&parameters));
+        // Without anything to carry the copies are never read: any buffer will do.
+        let group = bind(
+            gpu,
+            &self.carry_layout,
+            &[
+                &self.carry_parameters,
+                &self.moves,
+                self.radiance_before.as_ref().unwrap_or(&self.blocks),
+                self.squares_before.as_ref().unwrap_or(&self.noise),
+                &self.radiance,
+                &self.squares,
+            ],
+        );
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+        pass.set_pipeline(&self.carry);
+        pass.set_bind_group(0, &group, &[]);
+        let (x, y) = workgroups(moves.len() as u32, 1);
+        pass.dispatch_workgroups(x, y, 1);
+        Ok(())
+    }
+
+    /// Traces the paths of `jobs` and tells how noisy each block still is.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn trace(
+        &self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        jobs: &[Job],
+        eye: Vec3,
+    ) -> Result<Vec<f32>, GpuError> {
+        let most = (self.blocks.size() / size_of::<BlockRecord>() as u64) as usize;
+        let mut records = Vec::with_capacity(jobs.len().min(most));
+        let mut path_count = 0;
+        for job in jobs.iter().take(most) {
+            records.push(job.record(path_count));
+            path_count += job.paths();
+        }
+        if records.is_empty() {
+            return Ok(Vec::new());
+        }
+        let parameters = LightParameters {
+            eye: eye.to_array(),
+            block_count: records.len() as u32,
+            atlas_width: self.atlas_width,
+            ..Default::default()
+        };
+        gpu.queue
+            .write_buffer(&self.parameters, 0, bytemuck::bytes_of(&parameters));
+        gpu.queue
+            .write_buffer(&self.blocks, 0, bytemuck::cast_slice(&records));
+        let ends = Ends {
+            start: &self.start,
+            finish: &self.accumulate,
+            group: &self.group,
+            from_camera: false,
+        };
+        self.paths.follow(gpu, gpu_scene, ends, path_count);
+
+        let bytes = records.len() as u64 * 4;
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.measure);
+            pass.set_bind_group(0, &gpu_scene.group, &[]);
+            pass.set_bind_group(1, &self.paths.group, &[]);
+            pass.set_bind_group(2, &self.group, &[]);
+            pass.dispatch_workgroups((records.len() as u32).div_ceil(64), 1, 1);
+        }
+        encoder.copy_buffer_to_buffer(&self.noise, 0, &self.noise_readback, 0, bytes);
+        gpu.submit_and_read(encoder, &self.noise_readback, bytes, |bytes| {
+            bytemuck::cast_slice(bytes).to_vec()
+        })
+    }
+}
+
+fn move_record(new: Block, old: Option<Block>) -> Move {
+    let position = |block: Block| u32::from(block.x) | u32::from(block.y) << 16;
+    let level = |block: Block| u32::from(block.level.width) | u32::from(block.level.height) << 4;
+    Move {
+        to: position(new),
+        levels: level(new) | old.map_or(0, level) << 8,
+        origin: old.map_or(NO_BLOCK, position),
+        padding: 0,
+    }
+}

@@ -1,0 +1,127 @@
+//! Waves of light paths: whatever begins them and whatever gathers them, what
+//! lies between is the same.
+
+use shadecast_shaders::light::{
+    ADVANCE_SOURCE, HIT_BYTES, RAY_BYTES, STATE_BYTES, TRACE_SOURCE, Wave,
+};
+use wgpu::ShaderStages;
+
+use crate::gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout, workgroups};
+
+/// Most paths in flight; more only cost memory.
+const LONGEST_WAVE: u32 = 1 << 18;
+/// Threads of a workgroup in all kernels here.
+const GROUP: u32 = 64;
+
+/// The rays in flight and the kernels that all kinds of paths share.
+#[derive(Debug)]
+pub struct Paths {
+    /// Second group of every kernel that begins, traces or gathers paths.
+    pub layout: wgpu::BindGroupLayout,
+    pub(super) group: wgpu::BindGroup,
+    wave: wgpu::Buffer,
+    trace: wgpu::ComputePipeline,
+    advance: wgpu::ComputePipeline,
+    longest_wave: u32,
+}
+
+/// What begins paths and what gathers them, with their third group.
+#[derive(Clone, Copy, Debug)]
+pub struct Ends<'a> {
+    /// Makes the first vertex or ray of each path.
+    pub start: &'a wgpu::ComputePipeline,
+    /// Takes what each path brings.
+    pub finish: &'a wgpu::ComputePipeline,
+    /// What both bind.
+    pub group: &'a wgpu::BindGroup,
+    /// True where paths begin with a ray from a camera instead of a vertex.
+    pub from_camera: bool,
+}
+
+impl Paths {
+    /// Room for waves of at most `most` paths.
+    ///
+    /// # Errors
+    /// When a wave is larger than the device binds.
+    pub fn new(gpu: &Gpu, gpu_scene: &GpuScene, most: u32) -> Result<Self, GpuError> {
+        let longest_wave = most.clamp(1, LONGEST_WAVE).next_multiple_of(GROUP);
+        let layout = layout(
+            gpu,
+            ShaderStages::COMPUTE,
+            &[
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+                Binding::Uniform,
+            ],
+        );
+        let bytes = u64::from(longest_wave);
+        let rays = gpu.scratch("rays", bytes * RAY_BYTES)?;
+        let hits = gpu.scratch("hits", bytes * HIT_BYTES)?;
+        let states = gpu.scratch("paths", bytes * STATE_BYTES)?;
+        let wave = gpu.uniform("wave", size_of::<Wave>());
+        let layouts = [&gpu_scene.layout, &layout];
+        let trace =
+            gpu.compute_pipeline(TRACE_SOURCE, "trace_rays", &layouts, &gpu_scene.constants);
+        let advance =
+            gpu.compute_pipeline(ADVANCE_SOURCE, "advance", &layouts, &gpu_scene.constants);
+        let group = bind(gpu, &layout, &[&rays, &hits, &states, &wave]);
+        Ok(Self {
+            layout,
+            group,
+            wave,
+            trace,
+            advance,
+            longest_wave,
+        })
+    }
+
+    /// Follows `count` paths from their start to their end, and submits the work.
+    pub fn follow(&self, gpu: &Gpu, gpu_scene: &GpuScene, ends: Ends<'_>, count: u32) {
+        // A camera's ray comes before the first vertex; each vertex has rays of its own.
+        let steps = gpu_scene.bounces() + 1 + u32::from(ends.from_camera);
+        let mut first_job = 0;
+        while first_job < count {
+            let path_count = (count - first_job).min(self.longest_wave);
+            let wave = Wave {
+                path_count,
+                first_job,
+                cull: 0,
+                padding: 0,
+            };
+            for step in 0..steps {
+                let wave = Wave {
+                    cull: u32::from(ends.from_camera && step == 0),
+                    ..wave
+                };
+                let mut encoder = gpu
+                    .device
+                    .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                gpu.queue
+                    .write_buffer(&self.wave, 0, bytemuck::bytes_of(&wave));
+                {
+                    let mut pass =
+                        encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+                    pass.set_bind_group(0, &gpu_scene.group, &[]);
+                    pass.set_bind_group(1, &self.group, &[]);
+                    pass.set_bind_group(2, ends.group, &[]);
+                    let mut dispatch = |pipeline: &wgpu::ComputePipeline, threads: u32| {
+                        pass.set_pipeline(pipeline);
+                        let (x, y) = workgroups(threads, GROUP);
+                        pass.dispatch_workgroups(x, y, 1);
+                    };
+                    if step == 0 {
+                        dispatch(ends.start, path_count);
+                    }
+                    dispatch(&self.trace, path_count * 3);
+                    dispatch(&self.advance, path_count);
+                    if step + 1 == steps {
+                        dispatch(ends.finish, path_count);
+                    }
+                }
+                gpu.queue.submit([encoder.finish()]);
+            }
+            first_job += path_count;
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! Which blocks get paths in an update.
+//!
+//! The budget is a number of paths. Blocks that were never lit come first, all
+//! of them: if they are too many, each path lights two by two texels, then four
+//! by four, and so on, so that a first look never waits. What is left goes
+//! where a path removes most visible error: many pixels, much noise, few samples.
+
+use shadecast_protocol::{Block, PatchId, PatchShape};
+use shadecast_shaders::light::BlockRecord;
+
+use crate::patches::Patch;
+
+/// Coarsest first look: texels lit by one path, log2 of a side.
+const COARSEST: u32 = 3;
+/// Relative standard deviation that one path is believed to have before
+/// enough of them were measured.
+const EXPECTED_NOISE: f32 = 0.7;
+/// Samples after which the measured noise is believed as much as the expectation.
+const BELIEF: f32 = 3.0;
+
+/// A block that gets one path for each of its texels, or for each square of them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Job {
+    patch: PatchId,
+    block: Block,
+    shape: PatchShape,
+    first_triangle: u32,
+    instance: u32,
+    sample_index: u32,
+    log2_stride: u32,
+    longest_history: f32,
+}
+
+impl Job {
+    /// Paths that it takes.
+    #[must_use]
+    pub fn paths(&self) -> u32 {
+        let (width, height) = self.block.level.size();
+        (width >> self.log2_stride).max(1) * (height >> self.log2_stride).max(1)
+    }
+
+    pub(super) fn record(&self, first_job: u32) -> BlockRecord {
+        let shape = match self.shape {
+            PatchShape::Solo => 0,
+            PatchShape::Pair => 1,
+            PatchShape::Triple => 2,
+        };
+        BlockRecord {
+            first_job,
+            position: u32::from(self.block.x) | u32::from(self.block.y) << 16,
+            layout_bits: u32::from(self.block.level.width)
+                | u32::from(self.block.level.height) << 4
+                | shape << 8
+                | self.log2_stride << 10
+                | self.instance << 16,
+            first_triangle: self.first_triangle,
+            sample_index: self.sample_index,
+            patch_id: self.patch.0,
+            longest_history: self.longest_history,
+            padding: 0,
+        }
+    }
+}
+
+/// What is known of a patch's light.
+#[derive(Clone, Copy, Debug, Default)]
+struct Lit {
+    /// Samples drawn so far, of the sequence.
+    drawn: u32,
+    /// Samples that its present content is worth.
+    worth: f32,
+    /// Measured standard error, relative.
+    noise: f32,
+}
+
+/// Chooses jobs and remembers what came of them.
+#[derive(Clone, Debug)]
+pub struct Schedule {
+    lit: Vec<Lit>,
+    /// By patch: the longest history that its material allows.
+    longest_history: Vec<f32>,
+}
+
+impl Schedule {
+    /// Nothing is lit yet; `longest_history` by patch.
+    #[must_use]
+    pub fn new(longest_history: Vec<f32>) -> Self {
+        Self {
+            lit: vec![Lit::default(); longest_history.len()],
+            longest_history,
+        }
+    }
+
+    /// A patch got a block: its content was carried over, or is gone.
+    pub fn placed(&mut self, patch: PatchId, carried: bool, resized: bool) {
+        let lit = &mut self.lit[patch.0 as usize];
+        if !carried {
+            lit.worth = 0.0;
+        } else if resized {
+            lit.worth = lit.worth.min(12.0);
+        }
+    }
+
+    /// Jobs for about `budget` paths among the placed patches of the visible
+    /// set, given with the pixels that each covers.
+    #[must_use]
+    pub fn choose(
+        &self,
+        patches: &[Patch],
+        placed: impl Iterator<Item = (PatchId, Block, u32)>,
+        budget: u32,
+    ) -> Vec<Job> {
+        let mut first_looks = Vec::new();
+        let mut others: Vec<(f32, Job)> = Vec::new();
+        for (id, block, pixels) in placed {
+            let patch = &patches[id.0 as usize];
+            let lit = self.lit[id.0 as usize];
+            let job = Job {
+                patch: id,
+                block,
+                shape: patch.shape,
+                first_triangle: patch.first_triangle,
+                instance: u32::from(patch.object.0),
+                sample_index: lit.drawn,
+                log2_stride: 0,
+                longest_history: self.longest_history[id.0 as usize],
+            };
+            if lit.worth <= 0.0 {
+                first_looks.push(job);
+                continue;
+            }
+            let expected = EXPECTED_NOISE * EXPECTED_NOISE / lit.worth;
+            let believed =
+                (lit.noise * lit.noise * lit.worth + expected * BELIEF) / (lit.worth + BELIEF);
+            // Squared error that one more sample removes, per path.
+            let gain =
+                believed / (lit.worth + 1.0) * pixels.max(1) as f32 / block.level.area() as f32;
+            others.push((gain, job));
+        }
+        let cost = |stride: u32| -> u64 {
+            first_looks
+                .iter()
+                .map(|job| {
+                    u64::from(
+                        Job {
+                            log2_stride: stride,
+                            ..*job
+                        }
+                        .paths(),
+                    )
+                })
+                .sum()
+        };
+        let stride = (0..COARSEST)
+            .find(|&s| cost(s) <= u64::from(budget))
+            .unwrap_or(COARSEST);
+        let mut left = u64::from(budget).saturating_sub(cost(stride));
+        let mut jobs = first_looks;
+        for job in &mut jobs {
+            job.log2_stride = stride;
+        }
+        others.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.patch.cmp(&b.1.patch)));
+        for (_, job) in others {
+            let paths = u64::from(job.paths());
+            if paths > left {
+                break;
+            }
+            left -= paths;
+            jobs.push(job);
+        }
+        jobs
+    }
+
+    /// Notes that `jobs` were traced and how noisy each block is now.
+    pub fn traced(&mut self, jobs: &[Job], noise: &[f32]) {
+        for (job, &noise) in jobs.iter().zip(noise) {
+            let lit = &mut self.lit[job.patch.0 as usize];
+            lit.drawn = lit.drawn.wrapping_add(1);
+            let weight = if job.log2_stride == 0 { 1.0 } else { 0.25 };
+            lit.worth = lit.worth.min(job.longest_history) + weight;
+            lit.noise = if noise.is_finite() { noise } else { 0.0 };
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use shadecast_protocol::{Level, ObjectId};
+
+    fn patches(count: u32) -> Vec<Patch> {
+        (0..count)
+            .map(|first| Patch {
+                shape: PatchShape::Pair,
+                corners: [0; 5],
+                first_triangle: first * 2,
+                object: ObjectId::WORLD,
+                double_sided: false,
+                masked: false,
+            })
+            .collect()
+    }
+
+    fn block(index: u32) -> Block {
+        Block {
+            x: (index * 8) as u16,
+            y: 0,
+            level: Level {
+                width: 3,
+                height: 3,
+            },
+        }
+    }
+
+    fn placed(count: u32) -> impl Iterator<Item = (PatchId, Block, u32)> {
+        (0..count).map(|index| (PatchId(index), block(index), 10))
+    }
+
+    #[test]
+    fn every_block_gets_a_first_look_whatever_the_budget() {
+        let schedule = Schedule::new(vec![1e4; 50]);
+        for (budget, paths) in [(u32::MAX, 64), (50 * 16, 16), (50 * 5, 4), (0, 1)] {
+            let jobs = schedule.choose(&patches(50), placed(50), budget);
+            assert_eq!(jobs.len(), 50);
+            assert!(
+                jobs.iter().all(|job| job.paths() == paths),
+                "budget {budget}"
+            );
+        }
+    }
+
+    #[test]
+    fn paths_go_where_the_noise_is() {
+        let mut schedule = Schedule::new(vec![1e4; 3]);
+        let first = schedule.choose(&patches(3), placed(3), u32::MAX);
+        for _ in 0..20 {
+            schedule.traced(&first, &[0.01, 0.5, 0.01]);
+        }
+        let next = schedule.choose(&patches(3), placed(3), 64);
+        assert_eq!(next.len(), 1);
+        assert_eq!(next[0].patch, PatchId(1));
+    }
+
+    #[test]
+    fn a_block_that_lost_its_content_is_a_first_look_again() {
+        let mut schedule = Schedule::new(vec![1e4; 2]);
+        let first = schedule.choose(&patches(2), placed(2), u32::MAX);
+        schedule.traced(&first, &[f32::NAN, 0.1]);
+        schedule.placed(PatchId(1), false, false);
+        let next = schedule.choose(&patches(2), placed(2), 0);
+        assert_eq!(
+            next.iter().map(|job| job.patch).collect::<Vec<_>>(),
+            [PatchId(1)]
+        );
+    }
+}

@@ -1,0 +1,344 @@
+//! `shadecast serve`: the network on one thread, frames on another.
+
+mod network;
+mod stats;
+
+use std::{
+    sync::mpsc::{Receiver, RecvTimeoutError},
+    time::{Duration, Instant},
+};
+
+use anyhow::Context;
+use glam::{Quat, Vec3};
+use shadecast_protocol::{Codec, Pose, ServerTime, Sky, ToClient, Welcome};
+use shadecast_server::{
+    Gpu, GpuScene, Input, Output, Pipeline, Session, SessionConfig,
+    encode::OpenH264,
+    patches::{self, PatchLimits},
+    scene::{self, Scene},
+    still::StillPass,
+    tone_map,
+};
+
+use crate::{cli::ServeArguments, status::Status};
+use network::{Connection, Event, Network};
+use stats::Stats;
+
+/// Pixels per radian for which triangles are subdivided at load: a headset of
+/// today has about 1200 of them; a software renderer's windows far fewer.
+const PIXELS_PER_RADIAN: f32 = 1200.0;
+/// The same where the atlas is as small as a software renderer's.
+const SMALL_PIXELS_PER_RADIAN: f32 = 165.0;
+/// Height of a standing person's eyes above the play space's floor.
+const EYE_HEIGHT: f32 = 1.6;
+/// Clients that may be connected without having proved that they may.
+const MOST_STRANGERS: usize = 8;
+
+pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
+    // The port first: nobody wants to wait for a tree and then hear it is taken.
+    let network = Network::start(arguments.listen, arguments.identity.as_deref())?;
+    let status = Status::new();
+
+    status.say("loading the scene");
+    let scene = crate::load(&arguments.scene)?;
+    for warning in &scene.notes.warnings {
+        status.print(&format!("note: {warning}"));
+    }
+    let gpu = Gpu::open()?;
+    let side = arguments
+        .atlas
+        .unwrap_or(if gpu.is_software { 512 } else { 2048 });
+    let light_ms = arguments
+        .light_ms
+        .unwrap_or(if gpu.is_software { 120.0 } else { 15.0 });
+    let superblock = arguments.superblock.unwrap_or(side / 8);
+    let density = if side <= 1024 {
+        SMALL_PIXELS_PER_RADIAN
+    } else {
+        PIXELS_PER_RADIAN
+    };
+    let patched = patches::cut(scene, PatchLimits::for_atlas(superblock, density));
+    status.print(&patched.report.to_string());
+    let spawn = patched
+        .scene
+        .spawn
+        .unwrap_or_else(|| spawn_for(&patched.scene));
+
+    let bar = status.progress("building the BVH");
+    let gpu_scene = GpuScene::new(&gpu, &patched.scene, arguments.bounces, &mut |share| {
+        bar(share)
+    })?;
+    if gpu_scene.texture_halvings > 0 {
+        status.print(&format!(
+            "note: images were halved {} times to fit the GPU",
+            gpu_scene.texture_halvings
+        ));
+    }
+    let eye = spawn.then(Pose {
+        position: Vec3::Y * EYE_HEIGHT,
+        orientation: Quat::IDENTITY,
+    });
+    status.say("compiling kernels and measuring the exposure");
+    let exposure = match arguments.exposure {
+        Some(exposure) => exposure as f32,
+        None => StillPass::new(&gpu, &gpu_scene)?.automatic_exposure(&gpu, &gpu_scene, eye)?,
+    };
+    let sky = sky_picture(&patched.scene, exposure);
+    let mut stats = Stats::new(arguments, &gpu.adapter, &patched, exposure);
+    let encoder = OpenH264::new((arguments.bitrate * 1e6) as u32, arguments.rate as f32)?;
+    let mut pipeline = Pipeline::new(
+        gpu,
+        gpu_scene,
+        patched,
+        [side, side],
+        superblock,
+        Box::new(encoder),
+        exposure,
+    )
+    .context("cannot serve the scene")?;
+
+    let config = SessionConfig {
+        secret: network.line.secret,
+        welcome: Welcome {
+            codec: Codec::H264,
+            atlas_size: [side, side],
+            superblock,
+            world_from_play: spawn,
+            sky,
+        },
+        frame_period: Duration::from_secs_f64(1.0 / arguments.rate),
+        light_budget: Duration::from_secs_f64(light_ms * 1e-3),
+        head_samples: arguments.head_samples,
+    };
+    status.print("ready; start a client with:");
+    println!("{}", network.line);
+
+    let result = Server {
+        config,
+        network: &network,
+        stats: &mut stats,
+        status: &status,
+        strangers: Vec::new(),
+        client: None,
+        speed: None,
+    }
+    .run(&mut pipeline, &network.events, arguments.once);
+    status.clear();
+    if let Some(path) = &arguments.stats {
+        stats.write(path)?;
+    }
+    network.stop();
+    result
+}
+
+struct Client {
+    session: Session,
+    connection: Connection,
+}
+
+struct Server<'a> {
+    config: SessionConfig,
+    network: &'a Network,
+    stats: &'a mut Stats,
+    status: &'a Status,
+    strangers: Vec<Client>,
+    client: Option<Client>,
+    speed: Option<f64>,
+}
+
+impl Server<'_> {
+    fn run(
+        mut self,
+        pipeline: &mut Pipeline,
+        events: &Receiver<Event>,
+        once: bool,
+    ) -> anyhow::Result<()> {
+        let epoch = Instant::now();
+        loop {
+            match events.recv_timeout(Duration::from_millis(2)) {
+                Ok(Event::Stop) => return Ok(()),
+                Ok(event) => {
+                    let gone = self.handle(event);
+                    if gone && once {
+                        return Ok(());
+                    }
+                    continue;
+                }
+                Err(RecvTimeoutError::Disconnected) => anyhow::bail!("the network thread ended"),
+                Err(RecvTimeoutError::Timeout) => {}
+            }
+            let now = self.network.now();
+            for stranger in &mut self.strangers {
+                // Only to notice those who never say hello.
+                let _ = stranger.session.order_frame(now, 0);
+            }
+            self.flush();
+            let Some(client) = &mut self.client else {
+                continue;
+            };
+            let Some(order) = client
+                .session
+                .order_frame(now, client.connection.pictures_in_flight())
+            else {
+                continue;
+            };
+            match pipeline.frame(&order, &|| epoch.elapsed()) {
+                Ok(mut frame) => {
+                    frame.update.timing.finished = self.network.now();
+                    self.stats.add(&frame);
+                    client
+                        .session
+                        .handle_input(Input::FrameMade(Box::new(frame)));
+                    self.speed = client.session.speed();
+                    self.stats.sent(client.connection.sent_bytes());
+                    self.status
+                        .live(|| self.stats.line(client.session.latency()));
+                }
+                Err(error) => {
+                    self.stats.failures += 1;
+                    anyhow::ensure!(self.stats.failures < 10, "frames keep failing: {error}");
+                    self.status.print(&format!("a frame failed: {error}"));
+                    client.session.handle_input(Input::FrameFailed);
+                }
+            }
+            self.flush();
+        }
+    }
+
+    /// Returns true when the client that was streamed to has gone.
+    fn handle(&mut self, event: Event) -> bool {
+        match event {
+            Event::Connected(connection) => {
+                if self.strangers.len() >= MOST_STRANGERS {
+                    self.strangers
+                        .remove(0)
+                        .connection
+                        .close("too many clients");
+                }
+                let session = Session::new(self.config.clone(), self.network.now(), self.speed);
+                self.strangers.push(Client {
+                    session,
+                    connection,
+                });
+            }
+            Event::Message {
+                id,
+                received,
+                message,
+            } => {
+                let clients = self.strangers.iter_mut().chain(&mut self.client);
+                if let Some(client) = clients.into_iter().find(|c| c.connection.id == id) {
+                    client
+                        .session
+                        .handle_input(Input::Message { received, message });
+                }
+                self.flush();
+                return self.admit();
+            }
+            Event::Gone { id, reason } => {
+                self.strangers
+                    .retain(|stranger| stranger.connection.id != id);
+                if self
+                    .client
+                    .as_ref()
+                    .is_some_and(|client| client.connection.id == id)
+                {
+                    self.status.print(&format!("the client has gone: {reason}"));
+                    self.client = None;
+                    return true;
+                }
+            }
+            Event::Stop => {}
+        }
+        false
+    }
+
+    /// A stranger that proved itself takes the place of the client: a headset
+    /// that comes back need not wait for its own ghost to time out.
+    fn admit(&mut self) -> bool {
+        let Some(index) = self.strangers.iter().position(|s| s.session.is_streaming()) else {
+            return false;
+        };
+        let client = self.strangers.remove(index);
+        self.status
+            .print(&format!("streaming to {}", client.connection.address));
+        if let Some(old) = self.client.replace(client) {
+            old.connection.send(ToClient::Bye);
+            old.connection.close("another client took its place");
+        }
+        false
+    }
+
+    fn flush(&mut self) {
+        for client in self.strangers.iter_mut().chain(&mut self.client) {
+            while let Some(output) = client.session.poll_output() {
+                match output {
+                    Output::Send(message) => client.connection.send(message),
+                    Output::Close(reason) => client.connection.close(&reason),
+                }
+            }
+        }
+    }
+}
+
+/// Where to stand in a scene that does not say: in the middle of a room, or
+/// before an object that is smaller than one.
+fn spawn_for(scene: &Scene) -> Pose {
+    let mut low = Vec3::INFINITY;
+    let mut high = Vec3::NEG_INFINITY;
+    for &position in &scene.positions {
+        low = low.min(position);
+        high = high.max(position);
+    }
+    if !low.is_finite() || !high.is_finite() {
+        return Pose::IDENTITY;
+    }
+    let (middle, size) = ((low + high) * 0.5, high - low);
+    /// A scene smaller than this is an object.
+    const ROOM: f32 = 4.0;
+    let position = if size.max_element() < ROOM {
+        Vec3::new(
+            middle.x,
+            middle.y - EYE_HEIGHT,
+            high.z + size.max_element().max(0.3),
+        )
+    } else {
+        Vec3::new(middle.x, low.y, middle.z)
+    };
+    Pose {
+        position,
+        orientation: Quat::IDENTITY,
+    }
+}
+
+/// The sky as the client draws it behind everything.
+fn sky_picture(scene: &Scene, exposure: f32) -> Sky {
+    /// Enough for a gradient.
+    const SIZE: (u16, u16) = (32, 64);
+    let sky: scene::SkyModel = scene.sky;
+    let mut rgb = Vec::with_capacity(usize::from(SIZE.0) * usize::from(SIZE.1) * 3);
+    for row in 0..SIZE.1 {
+        let elevation = (0.5 - (f32::from(row) + 0.5) / f32::from(SIZE.1)) * std::f32::consts::PI;
+        for column in 0..SIZE.0 {
+            let turn =
+                ((f32::from(column) + 0.5) / f32::from(SIZE.0) - 0.5) * std::f32::consts::TAU;
+            let direction = Vec3::new(
+                turn.sin() * elevation.cos(),
+                elevation.sin(),
+                -turn.cos() * elevation.cos(),
+            );
+            rgb.extend(tone_map(sky.radiance(direction), exposure));
+        }
+    }
+    Sky {
+        width: SIZE.0,
+        height: SIZE.1,
+        rgb,
+    }
+}
+
+impl Network {
+    fn now(&self) -> ServerTime {
+        ServerTime(self.started.elapsed().as_nanos() as u64)
+    }
+}

@@ -1,0 +1,236 @@
+//! Still pictures through a pinhole camera, by the same paths as the atlas:
+//! what a client's picture is compared with.
+
+use std::time::Duration;
+
+use glam::{Mat3, Quat, Vec3};
+use shadecast_protocol::{Fov, Pose};
+use shadecast_shaders::light::{STILL_SOURCE, StillParameters, rows_of_affine};
+use wgpu::ShaderStages;
+
+use crate::{
+    gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout},
+    light::{Ends, Paths},
+    scene::Scene,
+};
+
+/// Indirect bounces of a server's paths unless told otherwise.
+pub const DEFAULT_BOUNCES: u32 = 1;
+/// Displayed value, linear, that the automatic exposure gives the log-average luminance.
+const MIDDLE_GREY: f32 = 0.2;
+/// Displayed value that it gives at most to the luminance that a tenth of the
+/// pixels exceed: sunlit walls keep their colour.
+const BRIGHT: f32 = 0.85;
+/// Samples a pixel of the pictures that the exposure is measured in.
+const EXPOSURE_SAMPLES: u32 = 16;
+
+/// A pinhole camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where it stands; it looks along -Z.
+    pub world_from_eye: Pose,
+    /// What it sees.
+    pub fov: Fov,
+    /// In pixels.
+    pub width: u32,
+    /// In pixels.
+    pub height: u32,
+}
+
+/// Linear radiance, row by row from the top.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Still {
+    /// In pixels.
+    pub width: u32,
+    /// In pixels.
+    pub height: u32,
+    /// W/(sr m²), one a pixel.
+    pub radiance: Vec<Vec3>,
+}
+
+/// The kernels of still pictures.
+#[derive(Debug)]
+pub struct StillPass {
+    paths: Paths,
+    start: wgpu::ComputePipeline,
+    add: wgpu::ComputePipeline,
+    layout: wgpu::BindGroupLayout,
+}
+
+impl StillPass {
+    /// Compiles the kernels for what the scene needs.
+    ///
+    /// # Errors
+    /// When the device has no room for a wave of paths.
+    pub fn new(gpu: &Gpu, gpu_scene: &GpuScene) -> Result<Self, GpuError> {
+        let layout = layout(
+            gpu,
+            ShaderStages::COMPUTE,
+            &[Binding::Uniform, Binding::Write],
+        );
+        let paths = Paths::new(gpu, gpu_scene, u32::MAX)?;
+        let layouts = [&gpu_scene.layout, &paths.layout, &layout];
+        let pipeline =
+            |entry| gpu.compute_pipeline(STILL_SOURCE, entry, &layouts, &gpu_scene.constants);
+        Ok(Self {
+            start: pipeline("start_at_pixels"),
+            add: pipeline("add_to_pixels"),
+            paths,
+            layout,
+        })
+    }
+
+    /// Renders `samples` samples a pixel; objects stand where they were last moved to.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn render(
+        &self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        camera: &Camera,
+        samples: u32,
+        seed: u32,
+    ) -> Result<Still, GpuError> {
+        let bytes = u64::from(camera.width) * u64::from(camera.height) * 16;
+        let parameters = gpu.uniform("still", size_of::<StillParameters>());
+        let sum = gpu.scratch("still", bytes)?;
+        let readback = gpu.readback("still", bytes);
+        let group = bind(gpu, &self.layout, &[&parameters, &sum]);
+        for sample_index in 0..samples.max(1) {
+            let pose = camera.world_from_eye;
+            let values = StillParameters {
+                world_from_eye: rows_of_affine(Mat3::from_quat(pose.orientation), pose.position),
+                tangents: camera.fov.tangents(),
+                size: [camera.width, camera.height],
+                sample_index,
+                seed,
+            };
+            gpu.queue
+                .write_buffer(&parameters, 0, bytemuck::bytes_of(&values));
+            let ends = Ends {
+                start: &self.start,
+                finish: &self.add,
+                group: &group,
+                from_camera: true,
+            };
+            self.paths
+                .follow(gpu, gpu_scene, ends, camera.width * camera.height);
+        }
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&sum, 0, &readback, 0, bytes);
+        let radiance = gpu.submit_and_read(encoder, &readback, bytes, |bytes| {
+            bytemuck::cast_slice::<u8, [f32; 4]>(bytes)
+                .iter()
+                .map(|[r, g, b, count]| Vec3::new(*r, *g, *b) / count.max(1.0))
+                .collect()
+        })?;
+        Ok(Still {
+            width: camera.width,
+            height: camera.height,
+            radiance,
+        })
+    }
+
+    /// The exposure that shows what is seen from `eye` at a middling brightness.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn automatic_exposure(
+        &self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        eye: Pose,
+    ) -> Result<f32, GpuError> {
+        let mut luminances = Vec::new();
+        for turn in 0..4 {
+            let turned = Pose {
+                position: Vec3::ZERO,
+                orientation: Quat::from_rotation_y(turn as f32 * std::f32::consts::FRAC_PI_2),
+            };
+            let camera = Camera {
+                world_from_eye: eye.then(turned),
+                fov: Fov::symmetric(std::f32::consts::FRAC_PI_2),
+                width: 32,
+                height: 32,
+            };
+            let still = self.render(gpu, gpu_scene, &camera, EXPOSURE_SAMPLES, 1)?;
+            let weights = Vec3::new(0.2126, 0.7152, 0.0722);
+            luminances.extend(
+                still
+                    .radiance
+                    .iter()
+                    .map(|r| r.dot(weights))
+                    .filter(|l| *l > 0.0),
+            );
+        }
+        if luminances.is_empty() {
+            return Ok(1.0);
+        }
+        luminances.sort_by(f32::total_cmp);
+        let log_mean =
+            luminances.iter().map(|l| f64::from(l.ln())).sum::<f64>() / luminances.len() as f64;
+        let bright = luminances[luminances.len() * 9 / 10];
+        Ok((MIDDLE_GREY / log_mean.exp() as f32)
+            .min(BRIGHT / bright)
+            .clamp(1e-6, 1e6))
+    }
+}
+
+/// Renders stills of a scene on a device of its own.
+#[derive(Debug)]
+pub struct StillRenderer {
+    gpu: Gpu,
+    gpu_scene: GpuScene,
+    pass: StillPass,
+    scene: Scene,
+}
+
+impl StillRenderer {
+    /// Opens a device and uploads the scene.
+    ///
+    /// # Errors
+    /// When there is no device or the scene does not fit it.
+    pub fn new(scene: &Scene) -> anyhow::Result<Self> {
+        let gpu = Gpu::open()?;
+        let gpu_scene = GpuScene::new(&gpu, scene, DEFAULT_BOUNCES, &mut |_| ())?;
+        let pass = StillPass::new(&gpu, &gpu_scene)?;
+        Ok(Self {
+            gpu,
+            gpu_scene,
+            pass,
+            scene: scene.clone(),
+        })
+    }
+
+    /// The device that it renders on.
+    #[must_use]
+    pub fn adapter(&self) -> &str {
+        &self.gpu.adapter
+    }
+
+    /// Renders with objects where they are at `scene_time`.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn render(
+        &mut self,
+        camera: &Camera,
+        scene_time: Duration,
+        samples: u32,
+        seed: u32,
+    ) -> anyhow::Result<Still> {
+        let poses: Vec<Pose> = self
+            .scene
+            .objects
+            .iter()
+            .map(|object| object.world_from_object(scene_time))
+            .collect();
+        self.gpu_scene.set_poses(&self.gpu, &poses);
+        Ok(self
+            .pass
+            .render(&self.gpu, &self.gpu_scene, camera, samples, seed)?)
+    }
+}

@@ -1,0 +1,389 @@
+//! Which patches may be seen until the next update takes effect.
+//!
+//! Each viewpoint is drawn as a picture of patch ids over an enlarged field of
+//! view; a compute pass counts the pixels of each patch. The union over both
+//! eyes of the current and the extrapolated heads is the potentially visible
+//! set. The atlas keeps a patch for a while after it was last in the set, which
+//! also covers what is too small to meet a pixel's centre in every picture.
+//!
+//! Source: SAS 2018, section 3.1 and figure 5.
+
+use std::time::Duration;
+
+use glam::{Mat4, Vec3};
+use shadecast_protocol::{Fov, PatchId, Pose, ViewReport};
+use shadecast_shaders::visibility::{IDS_SOURCE, MARK_SOURCE};
+use wgpu::ShaderStages;
+
+use crate::{
+    gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout},
+    patches::{DrawRange, PatchedScene},
+};
+
+/// Image plane of the id pictures relative to the eye's own (SAS 2018, section 5).
+const ENLARGEMENT: f32 = 1.2;
+/// Nearest thing that is drawn, metres: nearer than a face lets things come.
+const NEAR: f32 = 0.02;
+/// Largest side of an id picture; beyond it pixels grow instead.
+const LARGEST_SIDE: u32 = 4096;
+
+/// Where the eyes are sampled.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    /// Heads, from the reported one to the one at the end of the horizon.
+    pub world_from_heads: Vec<Pose>,
+    /// The report that they come from.
+    pub view: ViewReport,
+}
+
+impl Prediction {
+    /// `samples` heads, evenly over `horizon` from the report on, by linear
+    /// extrapolation of its velocities.
+    #[must_use]
+    pub fn linear(view: &ViewReport, horizon: Duration, samples: u32) -> Self {
+        let step = horizon.as_secs_f32() / (samples.max(2) - 1) as f32;
+        let world_from_heads = (0..samples.max(1))
+            .map(|i| {
+                let seconds = step * i as f32;
+                view.world_from_head.extrapolate(
+                    view.linear_velocity,
+                    view.angular_velocity,
+                    seconds,
+                )
+            })
+            .collect();
+        Self {
+            world_from_heads,
+            view: *view,
+        }
+    }
+
+    /// The head in the middle of the horizon.
+    #[must_use]
+    pub fn middle(&self) -> Pose {
+        let last = self.world_from_heads.len() - 1;
+        let (a, b) = (
+            self.world_from_heads[last / 2],
+            self.world_from_heads[last.div_ceil(2)],
+        );
+        Pose {
+            position: a.position.lerp(b.position, 0.5),
+            orientation: a.orientation.slerp(b.orientation, 0.5),
+        }
+    }
+
+    /// Pixels per radian in the middle of the left eye's picture.
+    #[must_use]
+    pub fn pixels_per_radian(&self) -> f32 {
+        let fov = self.view.eyes[0].fov;
+        f32::from(self.view.eye_resolution[0]) / (fov.right - fov.left)
+    }
+}
+
+/// A patch that may be seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VisiblePatch {
+    /// Its name.
+    pub patch: PatchId,
+    /// Pixels of all id pictures that it covers.
+    pub pixels: u32,
+}
+
+/// The pass that finds the potentially visible set.
+#[derive(Debug)]
+pub struct Visibility {
+    pipelines: Vec<(wgpu::RenderPipeline, DrawRange)>,
+    mark: wgpu::ComputePipeline,
+    mark_layout: wgpu::BindGroupLayout,
+    group: wgpu::BindGroup,
+    matrices: wgpu::Buffer,
+    most_matrices: usize,
+    counts: wgpu::Buffer,
+    readback: wgpu::Buffer,
+    target: Option<Target>,
+    patches: usize,
+}
+
+#[derive(Debug)]
+struct Target {
+    size: (u32, u32),
+    ids: wgpu::TextureView,
+    depth: wgpu::TextureView,
+    mark_group: wgpu::BindGroup,
+}
+
+impl Visibility {
+    /// Prepares to draw `scene`.
+    ///
+    /// # Errors
+    /// When a list is larger than the device binds.
+    pub fn new(gpu: &Gpu, gpu_scene: &GpuScene, scene: &PatchedScene) -> Result<Self, GpuError> {
+        let own_layout = layout(gpu, ShaderStages::VERTEX, &[Binding::Read, Binding::Read]);
+        let mut patch_of_triangle = vec![0_u32; scene.scene.triangles.len()];
+        for (id, patch) in (0..).zip(&scene.patches) {
+            for k in 0..patch.shape.triangles().len() {
+                patch_of_triangle[patch.first_triangle as usize + k] = id;
+            }
+        }
+        let most_matrices = 2 * 8 * (scene.scene.objects.len() + 1);
+        let matrices = gpu.scratch("view matrices", (most_matrices * size_of::<Mat4>()) as u64)?;
+        let patch_of_triangle = gpu.storage(
+            "patch of triangle",
+            bytemuck::cast_slice(&patch_of_triangle),
+        )?;
+        let group = bind(gpu, &own_layout, &[&patch_of_triangle, &matrices]);
+
+        let module = gpu
+            .device
+            .create_shader_module(wgpu::ShaderModuleDescriptor {
+                label: Some("patch ids"),
+                source: wgpu::ShaderSource::Wgsl(IDS_SOURCE.into()),
+            });
+        let pipeline_layout = gpu
+            .device
+            .create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+                label: Some("patch ids"),
+                bind_group_layouts: &[Some(&gpu_scene.layout), Some(&own_layout)],
+                immediate_size: 0,
+            });
+        let pipelines = scene
+            .ranges
+            .iter()
+            .map(|range| {
+                let options = wgpu::PipelineCompilationOptions {
+                    constants: &gpu_scene.constants,
+                    ..Default::default()
+                };
+                let pipeline = gpu
+                    .device
+                    .create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+                        label: Some("patch ids"),
+                        layout: Some(&pipeline_layout),
+                        vertex: wgpu::VertexState {
+                            module: &module,
+                            entry_point: Some("id_vertex"),
+                            compilation_options: options.clone(),
+                            buffers: &[],
+                        },
+                        primitive: wgpu::PrimitiveState {
+                            cull_mode: (!range.double_sided).then_some(wgpu::Face::Back),
+                            ..Default::default()
+                        },
+                        depth_stencil: Some(wgpu::DepthStencilState {
+                            format: wgpu::TextureFormat::Depth32Float,
+                            depth_write_enabled: Some(true),
+                            depth_compare: Some(wgpu::CompareFunction::Greater),
+                            stencil: wgpu::StencilState::default(),
+                            bias: wgpu::DepthBiasState::default(),
+                        }),
+                        multisample: wgpu::MultisampleState::default(),
+                        fragment: Some(wgpu::FragmentState {
+                            module: &module,
+                            entry_point: Some(if range.masked {
+                                "id_fragment_masked"
+                            } else {
+                                "id_fragment"
+                            }),
+                            compilation_options: options,
+                            targets: &[Some(wgpu::TextureFormat::R32Uint.into())],
+                        }),
+                        multiview_mask: None,
+                        cache: None,
+                    });
+                (pipeline, *range)
+            })
+            .collect();
+        let mark_layout = layout(gpu, ShaderStages::COMPUTE, &[Binding::Ids, Binding::Write]);
+        let mark = gpu.compute_pipeline(MARK_SOURCE, "mark", &[&mark_layout], &[]);
+        let bytes = (scene.patches.len().max(1) * 4) as u64;
+        Ok(Self {
+            pipelines,
+            mark,
+            mark_layout,
+            group,
+            matrices,
+            most_matrices,
+            counts: gpu.scratch("pixels of patch", bytes)?,
+            readback: gpu.readback("pixels of patch", bytes),
+            target: None,
+            patches: scene.patches.len(),
+        })
+    }
+
+    /// The potentially visible set, by ascending patch.
+    ///
+    /// `poses[n]` is `world_from_object` of `ObjectId(n + 1)`.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn potential(
+        &mut self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        prediction: &Prediction,
+        poses: &[Pose],
+    ) -> Result<Vec<VisiblePatch>, GpuError> {
+        let [width, height] = prediction.view.eye_resolution;
+        let enlarged = |side: u16| ((f32::from(side) * ENLARGEMENT) as u32).clamp(16, LARGEST_SIDE);
+        self.ensure_target(gpu, (enlarged(width), enlarged(height)));
+        let Some(target) = &self.target else {
+            return Ok(Vec::new());
+        };
+
+        let views: Vec<Mat4> = prediction
+            .world_from_heads
+            .iter()
+            .flat_map(|head| {
+                prediction
+                    .view
+                    .eyes
+                    .map(|eye| clip_from_world(head.then(eye.head_from_eye), eye.fov))
+            })
+            .collect();
+        let objects = poses.len() + 1;
+        let matrices: Vec<Mat4> = views
+            .iter()
+            .flat_map(|view| {
+                std::iter::once(*view).chain(poses.iter().map(move |pose| *view * pose.matrix()))
+            })
+            .take(self.most_matrices)
+            .collect();
+        gpu.queue
+            .write_buffer(&self.matrices, 0, bytemuck::cast_slice(&matrices));
+
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.clear_buffer(&self.counts, 0, None);
+        for view in 0..matrices.len() / objects {
+            self.record_ids(&mut encoder, target, gpu_scene, (view * objects) as u32);
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
+            pass.set_pipeline(&self.mark);
+            pass.set_bind_group(0, &target.mark_group, &[]);
+            pass.dispatch_workgroups(target.size.0.div_ceil(32), target.size.1.div_ceil(8), 1);
+        }
+        let bytes = (self.patches * 4) as u64;
+        if bytes == 0 {
+            return Ok(Vec::new());
+        }
+        encoder.copy_buffer_to_buffer(&self.counts, 0, &self.readback, 0, bytes);
+        gpu.submit_and_read(encoder, &self.readback, bytes, |bytes| {
+            (0..)
+                .zip(bytemuck::cast_slice::<u8, u32>(bytes))
+                .filter(|(_, pixels)| **pixels > 0)
+                .map(|(id, &pixels)| VisiblePatch {
+                    patch: PatchId(id),
+                    pixels,
+                })
+                .collect()
+        })
+    }
+
+    fn record_ids(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        target: &Target,
+        gpu_scene: &GpuScene,
+        first_matrix: u32,
+    ) {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("patch ids"),
+            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                view: &target.ids,
+                depth_slice: None,
+                resolve_target: None,
+                ops: wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                    store: wgpu::StoreOp::Store,
+                },
+            })],
+            depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
+                view: &target.depth,
+                depth_ops: Some(wgpu::Operations {
+                    load: wgpu::LoadOp::Clear(0.0),
+                    store: wgpu::StoreOp::Discard,
+                }),
+                stencil_ops: None,
+            }),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &gpu_scene.group, &[]);
+        pass.set_bind_group(1, &self.group, &[]);
+        for (pipeline, range) in &self.pipelines {
+            pass.set_pipeline(pipeline);
+            let matrix = first_matrix + u32::from(range.object.0);
+            let first = range.first_triangle * 3;
+            pass.draw(first..first + range.triangle_count * 3, matrix..matrix + 1);
+        }
+    }
+
+    fn ensure_target(&mut self, gpu: &Gpu, size: (u32, u32)) {
+        if self
+            .target
+            .as_ref()
+            .is_some_and(|target| target.size == size)
+        {
+            return;
+        }
+        let texture = |format, usage| {
+            gpu.device
+                .create_texture(&wgpu::TextureDescriptor {
+                    label: Some("patch ids"),
+                    size: wgpu::Extent3d {
+                        width: size.0,
+                        height: size.1,
+                        depth_or_array_layers: 1,
+                    },
+                    mip_level_count: 1,
+                    sample_count: 1,
+                    dimension: wgpu::TextureDimension::D2,
+                    format,
+                    usage,
+                    view_formats: &[],
+                })
+                .create_view(&wgpu::TextureViewDescriptor::default())
+        };
+        let attachment = wgpu::TextureUsages::RENDER_ATTACHMENT;
+        let ids = texture(
+            wgpu::TextureFormat::R32Uint,
+            attachment | wgpu::TextureUsages::TEXTURE_BINDING,
+        );
+        let mark_group = gpu.device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("mark"),
+            layout: &self.mark_layout,
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(&ids),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: self.counts.as_entire_binding(),
+                },
+            ],
+        });
+        let depth = texture(wgpu::TextureFormat::Depth32Float, attachment);
+        self.target = Some(Target {
+            size,
+            ids,
+            depth,
+            mark_group,
+        });
+    }
+}
+
+fn clip_from_world(world_from_eye: Pose, fov: Fov) -> Mat4 {
+    fov.enlarged(ENLARGEMENT).projection(NEAR) * world_from_eye.inverse().matrix()
+}
+
+/// The eye between both eyes, from which patches are measured and glossy
+/// texels are lit.
+#[must_use]
+pub fn eye_of(prediction: &Prediction) -> Vec3 {
+    let head = prediction.middle();
+    let eyes = prediction
+        .view
+        .eyes
+        .map(|eye| head.then(eye.head_from_eye).position);
+    (eyes[0] + eyes[1]) * 0.5
+}

@@ -1,0 +1,178 @@
+//! Every kernel validates, and every host struct lies in memory as WGSL has it.
+
+use std::mem::{offset_of, size_of};
+
+use naga::valid::{Capabilities, ValidationFlags, Validator};
+
+use crate::{light, picture, visibility};
+
+fn module(name: &str, source: &str) -> naga::Module {
+    let module = naga::front::wgsl::parse_str(source)
+        .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
+    Validator::new(ValidationFlags::all(), Capabilities::all())
+        .validate(&module)
+        .unwrap_or_else(|error| panic!("{name}: {}", error.emit_to_string(source)));
+    module
+}
+
+fn members(module: &naga::Module, name: &str) -> (u32, Vec<(String, u32)>) {
+    let found = module
+        .types
+        .iter()
+        .find(|(_, t)| t.name.as_deref() == Some(name));
+    let Some((
+        _,
+        naga::Type {
+            inner: naga::TypeInner::Struct { members, span },
+            ..
+        },
+    )) = found
+    else {
+        panic!("no struct {name}");
+    };
+    (
+        *span,
+        members
+            .iter()
+            .map(|m| (m.name.clone().unwrap_or_default(), m.offset))
+            .collect(),
+    )
+}
+
+macro_rules! same_layout {
+    ($module:expr, $host:ty, $($field:ident),+) => {{
+        let name = stringify!($host).rsplit(' ').next().unwrap();
+        let (size, found) = members($module, name);
+        assert_eq!(size as usize, size_of::<$host>(), "size of {name}");
+        let expected = vec![$((stringify!($field).to_owned(), offset_of!($host, $field) as u32)),+];
+        assert_eq!(found, expected, "layout of {name}");
+    }};
+}
+
+#[test]
+fn kernels_validate() {
+    for (name, source) in [
+        ("trace", light::TRACE_SOURCE),
+        ("advance", light::ADVANCE_SOURCE),
+        ("atlas", light::ATLAS_SOURCE),
+        ("still", light::STILL_SOURCE),
+        ("carry", light::CARRY_SOURCE),
+        ("picture", picture::SOURCE),
+        ("ids", visibility::IDS_SOURCE),
+        ("mark", visibility::MARK_SOURCE),
+    ] {
+        module(name, source);
+    }
+}
+
+#[test]
+fn layouts_match() {
+    use light::*;
+    use picture::PictureParameters;
+    let atlas = module("atlas", ATLAS_SOURCE);
+    same_layout!(
+        &atlas,
+        Globals,
+        sky_zenith,
+        light_count,
+        sky_horizon,
+        light_weight,
+        sky_ground,
+        instance_count,
+        sun_direction,
+        sun_cos,
+        sun_irradiance,
+        bounces
+    );
+    same_layout!(
+        &atlas,
+        TextureRecord,
+        offset,
+        size,
+        flags,
+        levels,
+        matrix,
+        translation,
+        padding
+    );
+    same_layout!(
+        &atlas,
+        Material,
+        base_color,
+        emissive,
+        metallic,
+        roughness,
+        normal_scale,
+        alpha_cutoff,
+        f0,
+        double_sided,
+        emission_weight,
+        padding,
+        textures
+    );
+    same_layout!(
+        &atlas,
+        LightRecord,
+        kind,
+        triangle,
+        instance,
+        cumulative,
+        position,
+        probability,
+        intensity,
+        range,
+        direction,
+        cos_outer,
+        cos_inner,
+        area,
+        padding
+    );
+    same_layout!(
+        &atlas,
+        Instance,
+        world_from_object,
+        object_from_world,
+        root_node,
+        first_triangle,
+        padding
+    );
+    same_layout!(
+        &atlas,
+        LightParameters,
+        eye,
+        block_count,
+        atlas_width,
+        seed,
+        padding
+    );
+    same_layout!(
+        &atlas,
+        BlockRecord,
+        first_job,
+        position,
+        layout_bits,
+        first_triangle,
+        sample_index,
+        patch_id,
+        longest_history,
+        padding
+    );
+    same_layout!(&atlas, Wave, path_count, first_job, cull, padding);
+    assert_eq!(u64::from(members(&atlas, "PathState").0), STATE_BYTES);
+    assert_eq!(u64::from(members(&atlas, "Ray").0) * 3, RAY_BYTES);
+    let still = module("still", STILL_SOURCE);
+    same_layout!(
+        &still,
+        StillParameters,
+        world_from_eye,
+        tangents,
+        size,
+        sample_index,
+        seed
+    );
+    let carry = module("carry", CARRY_SOURCE);
+    same_layout!(&carry, Move, to, levels, origin, padding);
+    same_layout!(&carry, CarryParameters, move_count, atlas_width, padding);
+    let planes = module("picture", crate::picture::SOURCE);
+    same_layout!(&planes, PictureParameters, size, exposure, padding);
+}

@@ -1,0 +1,42 @@
+//! Path tracing at the texels of an atlas, or at the pixels of a camera.
+
+mod atlas;
+mod carry;
+mod path;
+mod sampler;
+mod scene;
+mod still;
+
+pub use atlas::{BlockRecord, LightParameters, PatchPoint, patch_point, texel_coordinates};
+pub use carry::{CarryParameters, Move, NO_BLOCK};
+pub use path::{HIT_BYTES, RAY_BYTES, STATE_BYTES, Wave};
+pub use sampler::Sampler;
+pub use scene::{
+    Globals, Instance, LightRecord, Material, NO_TEXTURE, TextureRecord, rows_of_affine,
+};
+pub use still::StillParameters;
+
+/// The scene's bindings and everything a path needs.
+macro_rules! path_source {
+    ($($entry:literal),*) => {
+        concat!(
+            include_str!("scene.wgsl"),
+            include_str!("trace.wgsl"),
+            include_str!("sampler.wgsl"),
+            include_str!("bsdf.wgsl"),
+            include_str!("path.wgsl"),
+            $(include_str!($entry)),*
+        )
+    };
+}
+
+/// Kernel `trace_rays`.
+pub const TRACE_SOURCE: &str = concat!(include_str!("scene.wgsl"), include_str!("trace.wgsl"));
+/// Kernel `advance`.
+pub const ADVANCE_SOURCE: &str = path_source!();
+/// Kernels `start_at_texels`, `accumulate` and `measure_noise`.
+pub const ATLAS_SOURCE: &str = path_source!("atlas.wgsl", "noise.wgsl");
+/// Kernels `start_at_pixels` and `add_to_pixels`.
+pub const STILL_SOURCE: &str = path_source!("still.wgsl");
+/// Kernel `carry_blocks`.
+pub const CARRY_SOURCE: &str = include_str!("carry.wgsl");
