@@ -66,10 +66,10 @@ pub(crate) struct ServeArguments {
     #[arg(long, default_value = "0.0.0.0:4433")]
     pub(crate) listen: SocketAddr,
     /// Side of the atlas in texels [default: 2048, or 512 where the GPU is a program on the CPU]
-    #[arg(long, value_parser = clap::value_parser!(u16).range(64..=8192))]
+    #[arg(long, value_parser = atlas_side)]
     pub(crate) atlas: Option<u16>,
-    /// Side of a superblock, and so of the largest block, in texels [default: an eighth of the atlas]
-    #[arg(long)]
+    /// Side of a superblock, and so of the largest block, in texels [default: at most an eighth of the atlas]
+    #[arg(long, value_parser = superblock_side)]
     pub(crate) superblock: Option<u16>,
     /// Target bitrate of the video, Mbit/s
     #[arg(long, default_value_t = 20.0, value_parser = positive)]
@@ -77,7 +77,7 @@ pub(crate) struct ServeArguments {
     /// Most updates a second
     #[arg(long, default_value_t = 30.0, value_parser = positive)]
     pub(crate) rate: f64,
-    /// Time for path tracing in each update, milliseconds [default: 15, or 120 where the GPU is a program on the CPU]
+    /// Time for path tracing in each update, milliseconds [default: 15, or 140 where the GPU is a program on the CPU]
     #[arg(long, value_parser = positive)]
     pub(crate) light_ms: Option<f64>,
     /// Indirect bounces of light
@@ -104,6 +104,21 @@ fn triangles(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count @ 1_000..=8_000_000) => Ok(count),
         _ => Err("a number from 1000 to 8000000 is expected".to_owned()),
+    }
+}
+
+/// What the video can be: whole macroblocks, and no more than decoders take.
+fn atlas_side(text: &str) -> Result<u16, String> {
+    match text.parse::<u16>() {
+        Ok(side @ 64..=8192) if side.is_multiple_of(16) => Ok(side),
+        _ => Err("a multiple of 16 from 64 to 8192 is expected".to_owned()),
+    }
+}
+
+fn superblock_side(text: &str) -> Result<u16, String> {
+    match text.parse::<u16>() {
+        Ok(side @ 4..=8192) if side.is_power_of_two() => Ok(side),
+        _ => Err("a power of two from 4 to 8192 is expected".to_owned()),
     }
 }
 

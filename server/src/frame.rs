@@ -135,7 +135,7 @@ impl Pipeline {
         let atlas = Atlas::new(size, superblock)?;
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
         let light = Light::new(&gpu, &gpu_scene, size)?;
-        let picture = PictureConversion::new(&gpu, light.radiance(), size)?;
+        let picture = PictureConversion::new(&gpu, light.shown(), size)?;
         let histories = scene
             .patches
             .iter()
@@ -219,7 +219,9 @@ impl Pipeline {
         self.light.record_moves(&self.gpu, &mut encoder, &placed)?;
         self.gpu.queue.submit([encoder.finish()]);
         let eye = eye_of(&order.prediction);
-        let noise = self.light.trace(&self.gpu, &self.gpu_scene, &jobs, eye)?;
+        let noise = self
+            .light
+            .trace(&self.gpu, &self.gpu_scene, &jobs, &placed.placements, eye)?;
         self.schedule.traced(&jobs, &noise);
         stages.light = lap();
 

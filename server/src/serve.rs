@@ -25,10 +25,11 @@ use network::{Connection, Event, Network};
 use stats::Stats;
 
 /// Pixels per radian for which triangles are subdivided at load: a headset of
-/// today has about 1200 of them; a software renderer's windows far fewer.
+/// today has about 1200 of them.
 const PIXELS_PER_RADIAN: f32 = 1200.0;
-/// The same where the atlas is as small as a software renderer's.
-const SMALL_PIXELS_PER_RADIAN: f32 = 165.0;
+/// The same for a small atlas: half of what a software renderer's eyes have,
+/// because twice the triangles cost it more than a blurred floor at one's feet.
+const SMALL_PIXELS_PER_RADIAN: f32 = 88.0;
 /// Height of a standing person's eyes above the play space's floor.
 const EYE_HEIGHT: f32 = 1.6;
 /// Clients that may be connected without having proved that they may.
@@ -50,8 +51,12 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
         .unwrap_or(if gpu.is_software { 512 } else { 2048 });
     let light_ms = arguments
         .light_ms
-        .unwrap_or(if gpu.is_software { 120.0 } else { 15.0 });
-    let superblock = arguments.superblock.unwrap_or(side / 8);
+        .unwrap_or(if gpu.is_software { 140.0 } else { 15.0 });
+    let superblock = arguments.superblock.unwrap_or_else(|| superblock_of(side));
+    anyhow::ensure!(
+        side.is_multiple_of(superblock),
+        "an atlas of {side} texels a side cannot be cut into superblocks of {superblock}"
+    );
     let density = if side <= 1024 {
         SMALL_PIXELS_PER_RADIAN
     } else {
@@ -263,7 +268,7 @@ impl Server<'_> {
         self.status
             .print(&format!("streaming to {}", client.connection.address));
         if let Some(old) = self.client.replace(client) {
-            old.connection.send(ToClient::Bye);
+            old.connection.send(Box::new(ToClient::Bye));
             old.connection.close("another client took its place");
         }
         false
@@ -279,6 +284,11 @@ impl Server<'_> {
             }
         }
     }
+}
+
+/// The largest side that is at most an eighth of the atlas's and divides it.
+fn superblock_of(atlas_side: u16) -> u16 {
+    1 << (atlas_side / 8).ilog2().min(atlas_side.trailing_zeros())
 }
 
 /// Where to stand in a scene that does not say: in the middle of a room, or

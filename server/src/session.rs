@@ -4,6 +4,9 @@
 //! The session knows who may connect, where the head was last seen, how long
 //! an update takes to be seen, and when the next frame is worth making.
 
+#[cfg(test)]
+mod tests;
+
 use std::{collections::VecDeque, time::Duration};
 
 use shadecast_protocol::{
@@ -64,7 +67,7 @@ pub enum Input {
 #[derive(Clone, Debug)]
 pub enum Output {
     /// Tell the client.
-    Send(ToClient),
+    Send(Box<ToClient>),
     /// End the connection.
     Close(String),
 }
@@ -248,12 +251,14 @@ impl Session {
         };
         if let Some(refusal) = refusal {
             self.outputs
-                .push_back(Output::Send(ToClient::Refused(refusal)));
+                .push_back(Output::Send(Box::new(ToClient::Refused(refusal))));
             self.close(format!("it was refused: {refusal}"));
             return;
         }
         self.outputs
-            .push_back(Output::Send(ToClient::Welcome(self.config.welcome.clone())));
+            .push_back(Output::Send(Box::new(ToClient::Welcome(
+                self.config.welcome.clone(),
+            ))));
         self.state = State::Streaming(Box::new(Stream {
             next_frame: FrameId(0),
             view: None,
@@ -278,9 +283,9 @@ impl Session {
             *speed += (measured - *speed) * SPEED_WEIGHT;
         }
         self.outputs
-            .push_back(Output::Send(ToClient::Update(frame.update)));
+            .push_back(Output::Send(Box::new(ToClient::Update(frame.update))));
         self.outputs
-            .push_back(Output::Send(ToClient::Picture(frame.picture)));
+            .push_back(Output::Send(Box::new(ToClient::Picture(frame.picture))));
     }
 
     fn close(&mut self, reason: String) {

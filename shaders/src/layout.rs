@@ -82,7 +82,10 @@ fn layouts_match() {
         sun_direction,
         sun_cos,
         sun_irradiance,
-        bounces
+        bounces,
+        faint,
+        spare,
+        padding
     );
     same_layout!(
         &atlas,
@@ -157,7 +160,7 @@ fn layouts_match() {
         longest_history,
         padding
     );
-    same_layout!(&atlas, Wave, path_count, first_job, cull, padding);
+    same_layout!(&atlas, Wave, path_count, first_job, cull, step);
     assert_eq!(u64::from(members(&atlas, "PathState").0), STATE_BYTES);
     assert_eq!(u64::from(members(&atlas, "Ray").0) * 3, RAY_BYTES);
     let still = module("still", STILL_SOURCE);

@@ -3,25 +3,32 @@
 use std::{
     fmt::Write as _,
     path::{Path, PathBuf},
+    time::Instant,
 };
 
-use anyhow::{Context, Result};
-use image::{RgbImage, imageops};
+use anyhow::{Context, Result, ensure};
+use image::{
+    RgbImage,
+    imageops::{self, FilterType},
+};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
     recorded::Sample,
-    references::{Reference, References},
+    references::{Reference, References, View},
+    window::Window,
     write,
 };
-use crate::{FlipMap, flip, psnr, ssim};
+use crate::{FlipMap, flip, mean_squared_error, psnr_from_mean_squared_error, ssim};
 
 /// Samples that get a picture of client, reference and error side by side.
-const COMPARED: usize = 3;
+const SHOWN: usize = 6;
+/// Windows are enlarged by a whole factor to about this many pixels there.
+const SHOWN_SIDE: u32 = 240;
 /// Pixels between pictures side by side.
 const GAP: u32 = 4;
 
-/// One picture of the client against its reference.
+/// A window of one picture of the client against its reference.
 #[derive(Clone, Debug)]
 pub(super) struct SampleError {
     pub(super) picture: String,
@@ -29,7 +36,8 @@ pub(super) struct SampleError {
     pub(super) seconds: f64,
     pub(super) pose_age_ms: f64,
     pub(super) frame: u32,
-    pub(super) psnr_db: f64,
+    pub(super) window: Window,
+    pub(super) mean_squared_error: f64,
     pub(super) ssim: f64,
     pub(super) flip: f64,
     /// Of the last server view as it is, at the server's pose.
@@ -38,32 +46,48 @@ pub(super) struct SampleError {
     pub(super) reference_noise: f64,
 }
 
-/// Renders a reference for every sample and measures the sample against it.
-/// Writes the reference beside the sample, and `compare_*.png`.
+impl SampleError {
+    pub(super) fn psnr_db(&self) -> f64 {
+        psnr_from_mean_squared_error(self.mean_squared_error)
+    }
+}
+
+/// Renders a reference for the window of every sample, by the deadline if
+/// there is one, and measures the sample against it. Writes the reference
+/// beside the sample, and `compare_*.png`.
 pub(super) fn measure(
     out: &Path,
     samples: &[Sample],
+    windows: &[Window],
     references: &mut References,
+    deadline: Option<Instant>,
 ) -> Result<Vec<SampleError>> {
-    let Some(first) = samples.first() else {
-        return Ok(Vec::new());
-    };
-    references.plan(&first.camera(), samples.len())?;
+    let views = samples
+        .iter()
+        .zip(windows)
+        .map(|(sample, window)| {
+            Ok(View {
+                camera: window.camera(&sample.camera()),
+                scene_time: sample.scene_time()?,
+            })
+        })
+        .collect::<Result<Vec<View>>>()?;
+    if let Some(deadline) = deadline {
+        references.plan(&views, deadline)?;
+    }
     let bar = progress_bar(2 * samples.len() as u64, references.samples_per_pixel());
-    let compared = compared(samples.len());
+    let shown = shown(samples.len());
     let mut errors = Vec::with_capacity(samples.len());
-    for (index, sample) in samples.iter().enumerate() {
-        let reference =
-            references.render(index as u32, &sample.camera(), sample.scene_time()?, || {
-                bar.inc(1)
-            })?;
-        let picture = read(&out.join(&sample.picture))?;
-        let unwarped = read(&out.join(&sample.unwarped))?;
-        let map = flip(&reference.picture, &picture)
-            .with_context(|| format!("{} does not match its record", sample.picture))?;
-        errors.push(error(sample, &picture, &unwarped, &reference, &map)?);
+    for (index, ((sample, &window), view)) in samples.iter().zip(windows).zip(&views).enumerate() {
+        let reference = references.render(index as u32, view, || bar.inc(1))?;
+        let picture = part(out, &sample.picture, sample, window)?;
+        let unwarped = part(out, &sample.unwarped, sample, window)?;
+        let map = flip(&reference.picture, &picture)?;
+        errors.push(error(
+            sample, window, &picture, &unwarped, &reference, &map,
+        )?);
         save(&reference_path(out, sample), &reference.picture)?;
-        if let Some(number) = compared.iter().position(|&compared| compared == index) {
+        if let Some(number) = shown.iter().position(|&shown| shown == index) {
             let row = side_by_side(&[&picture, &reference.picture, &map.picture()]);
             save(&out.join(format!("compare_{number:02}.png")), &row)?;
         }
@@ -72,8 +96,20 @@ pub(super) fn measure(
     Ok(errors)
 }
 
+/// The window of a picture that the client wrote.
+fn part(out: &Path, name: &str, sample: &Sample, window: Window) -> Result<RgbImage> {
+    let picture = read(&out.join(name))?;
+    let camera = sample.camera();
+    ensure!(
+        picture.dimensions() == (camera.width, camera.height),
+        "{name} does not match its record"
+    );
+    Ok(window.of(&picture))
+}
+
 fn error(
     sample: &Sample,
+    window: Window,
     picture: &RgbImage,
     unwarped: &RgbImage,
     reference: &Reference,
@@ -85,19 +121,18 @@ fn error(
         seconds: sample.seconds,
         pose_age_ms: sample.pose_age_ms,
         frame: sample.frame,
-        psnr_db: psnr(&reference.picture, picture)?,
+        window,
+        mean_squared_error: mean_squared_error(&reference.picture, picture)?,
         ssim: ssim(&reference.picture, picture)?,
         flip: map.mean(),
-        flip_unwarped: flip(&reference.picture, unwarped)
-            .with_context(|| format!("{} does not match its record", sample.unwarped))?
-            .mean(),
+        flip_unwarped: flip(&reference.picture, unwarped)?.mean(),
         reference_noise: reference.noise()?,
     })
 }
 
-/// Indices of the samples that are compared in a picture: first, middle, last.
-fn compared(samples: usize) -> Vec<usize> {
-    let count = COMPARED.min(samples);
+/// Indices of the samples that are shown, from the first to the last.
+fn shown(samples: usize) -> Vec<usize> {
+    let count = SHOWN.min(samples);
     (0..count)
         .map(|i| i * (samples - 1) / (count - 1).max(1))
         .collect()
@@ -110,18 +145,17 @@ fn reference_path(out: &Path, sample: &Sample) -> PathBuf {
     picture.with_file_name(format!("{stem}_reference.png"))
 }
 
+/// Pictures of one size in a row, each pixel enlarged to a square where they are small.
 fn side_by_side(pictures: &[&RgbImage]) -> RgbImage {
-    let width = pictures
-        .iter()
-        .map(|picture| picture.width() + GAP)
-        .sum::<u32>()
-        - GAP;
-    let height = pictures.iter().map(|picture| picture.height()).max();
-    let mut row = RgbImage::new(width, height.unwrap_or(0));
+    let (width, height) = pictures.first().map_or((1, 1), |first| first.dimensions());
+    let factor = (SHOWN_SIDE / width.max(height).max(1)).max(1);
+    let (width, height) = (width * factor, height * factor);
+    let mut row = RgbImage::new((width + GAP) * pictures.len() as u32 - GAP, height);
     let mut x = 0;
     for picture in pictures {
-        imageops::replace(&mut row, *picture, x.into(), 0);
-        x += picture.width() + GAP;
+        let enlarged = imageops::resize(*picture, width, height, FilterType::Nearest);
+        imageops::replace(&mut row, &enlarged, x, 0);
+        x += i64::from(width + GAP);
     }
     row
 }
@@ -129,18 +163,21 @@ fn side_by_side(pictures: &[&RgbImage]) -> RgbImage {
 /// One row a sample.
 pub(super) fn write_csv(path: &Path, errors: &[SampleError]) -> Result<()> {
     let mut csv = String::from(
-        "picture,eye,frame,seconds,pose_age_ms,psnr_db,ssim,flip,flip_unwarped,reference_noise_mse\n",
+        "picture,eye,frame,seconds,pose_age_ms,x,y,side,mse,ssim,flip,flip_unwarped,reference_noise_mse\n",
     );
     for error in errors {
         writeln!(
             csv,
-            "{},{},{},{:.3},{:.2},{:.3},{:.5},{:.5},{:.5},{:.3e}",
+            "{},{},{},{:.3},{:.2},{},{},{},{:.3e},{:.5},{:.5},{:.5},{:.3e}",
             error.picture,
             error.eye,
             error.frame,
             error.seconds,
             error.pose_age_ms,
-            error.psnr_db,
+            error.window.x,
+            error.window.y,
+            error.window.width,
+            error.mean_squared_error,
             error.ssim,
             error.flip,
             error.flip_unwarped,
@@ -174,21 +211,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn first_middle_and_last_are_compared() {
-        assert_eq!(compared(24), [0, 11, 23]);
-        assert_eq!(compared(3), [0, 1, 2]);
-        assert_eq!(compared(2), [0, 1]);
-        assert_eq!(compared(1), [0]);
-        assert!(compared(0).is_empty());
+    fn first_and_last_are_shown() {
+        assert_eq!(shown(24), [0, 4, 9, 13, 18, 23]);
+        assert_eq!(shown(3), [0, 1, 2]);
+        assert_eq!(shown(1), [0]);
+        assert!(shown(0).is_empty());
     }
 
     #[test]
-    fn pictures_lie_side_by_side() {
-        let plain = |level| RgbImage::from_pixel(2, 3, image::Rgb([level; 3]));
+    fn pictures_lie_enlarged_side_by_side() {
+        let plain = |level| RgbImage::from_pixel(80, 40, image::Rgb([level; 3]));
         let row = side_by_side(&[&plain(1), &plain(2)]);
-        assert_eq!(row.dimensions(), (2 + GAP + 2, 3));
-        assert_eq!(row.get_pixel(0, 0).0[0], 1);
-        assert_eq!(row.get_pixel(2, 0).0[0], 0);
-        assert_eq!(row.get_pixel(2 + GAP, 2).0[0], 2);
+        assert_eq!(row.dimensions(), (240 + GAP + 240, 120));
+        assert_eq!(row.get_pixel(239, 119).0[0], 1);
+        assert_eq!(row.get_pixel(240, 0).0[0], 0);
+        assert_eq!(row.get_pixel(240 + GAP, 119).0[0], 2);
+        let large = RgbImage::new(300, 300);
+        assert_eq!(side_by_side(&[&large]).dimensions(), (300, 300));
     }
 }

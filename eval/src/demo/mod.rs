@@ -7,6 +7,7 @@ mod references;
 mod report;
 mod summary;
 mod targets;
+mod window;
 
 use std::{
     fs,
@@ -21,6 +22,7 @@ use processes::{Client, Server};
 use recorded::{ClientRecord, ServerRecord};
 use references::References;
 use summary::Summary;
+use window::Window;
 
 /// What to stream, for how long, and where to leave the figures.
 #[derive(Clone, Debug, clap::Args)]
@@ -58,6 +60,9 @@ pub struct Options {
     /// Seconds that all references together may take.
     #[arg(long, value_name = "N", default_value_t = 45)]
     pub reference_seconds: u32,
+    /// Compares whole pictures instead of a window of each, however long that takes.
+    #[arg(long, conflicts_with = "reference_seconds")]
+    pub whole: bool,
 }
 
 const COURTYARD: &str = "courtyard";
@@ -89,8 +94,14 @@ pub fn run(options: &Options) -> Result<String> {
     eprintln!("rendering {} references", client.samples.len());
     let deadline = Instant::now() + Duration::from_secs(options.reference_seconds.into());
     let scene = load(options)?;
-    let mut references = References::new(&scene, server.exposure, options.seed, deadline)?;
-    let errors = errors::measure(&options.out, &client.samples, &mut references)?;
+    let mut references = References::new(&scene, server.exposure, options.seed)?;
+    let errors = errors::measure(
+        &options.out,
+        &client.samples,
+        &windows(options, &client),
+        &mut references,
+        (!options.whole).then_some(deadline),
+    )?;
     errors::write_csv(&options.out.join("error.csv"), &errors)?;
 
     let summary = Summary::new(
@@ -110,6 +121,19 @@ pub fn run(options: &Options) -> Result<String> {
         targets::text(&targets),
         options.out.join("report.md").display()
     ))
+}
+
+/// What of each sample is compared.
+fn windows(options: &Options, client: &ClientRecord) -> Vec<Window> {
+    let count = client.samples.len();
+    let cameras = client.samples.iter().map(recorded::Sample::camera);
+    cameras
+        .enumerate()
+        .map(|(index, camera)| match options.whole {
+            true => Window::whole(&camera),
+            false => Window::of_sample(index, count, &camera),
+        })
+        .collect()
 }
 
 /// The same scene as the server's.

@@ -19,45 +19,62 @@ use crate::{MetricError, mean_squared_error};
 
 /// Fewest samples a pixel of one half, even on a machine that is too slow for
 /// them.
-const MIN_SAMPLES: u32 = 4;
+const MIN_SAMPLES: u32 = 8;
 /// Most: beyond, the noise is below one level of eight bits.
 const MAX_SAMPLES: u32 = 1024;
-/// Samples a pixel by which the speed is measured.
-const PROBE_SAMPLES: u32 = 2;
+/// Of one half where no deadline chooses: as good as windows in the demo's time
+/// on two cores.
+const SAMPLES_WITHOUT_DEADLINE: u32 = 24;
+/// Samples a pixel by which the speed is measured, in every reference.
+const PROBE_SAMPLES: u32 = 1;
 
-/// Renders references with as many samples as a deadline allows.
+/// What a reference is taken from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct View {
+    pub(super) camera: Camera,
+    /// Where moving objects are.
+    pub(super) scene_time: Duration,
+}
+
+/// Renders references, each with as many samples as the others.
 pub(super) struct References {
     renderer: StillRenderer,
     exposure: f32,
     seed: u32,
-    deadline: Instant,
     /// Of one half; chosen by [`Self::plan`].
     samples: u32,
 }
 
 impl References {
-    pub(super) fn new(scene: &Scene, exposure: f32, seed: u32, deadline: Instant) -> Result<Self> {
+    pub(super) fn new(scene: &Scene, exposure: f32, seed: u32) -> Result<Self> {
         Ok(Self {
             renderer: StillRenderer::new(scene).context("cannot render references")?,
             exposure,
             seed,
-            deadline,
-            samples: MIN_SAMPLES,
+            samples: SAMPLES_WITHOUT_DEADLINE,
         })
     }
 
-    /// Chooses the samples so that `count` references as seen by `camera` end
-    /// in time.
-    pub(super) fn plan(&mut self, camera: &Camera, count: usize) -> Result<()> {
-        // The first dispatch compiles the kernel; the second one shows its speed.
-        self.renderer.render(camera, Duration::ZERO, 1, self.seed)?;
+    /// Chooses the samples so that references of `views` end by `deadline`.
+    pub(super) fn plan(&mut self, views: &[View], deadline: Instant) -> Result<()> {
+        // The first dispatches compile the kernels; their time does not count.
+        if let Some(first) = views.first() {
+            self.probe(first)?;
+        }
         let began = Instant::now();
-        self.renderer
-            .render(camera, Duration::ZERO, PROBE_SAMPLES, self.seed)?;
+        for view in views {
+            self.probe(view)?;
+        }
         let one_sample = began.elapsed() / PROBE_SAMPLES;
-        let left = self.deadline.saturating_duration_since(Instant::now());
-        self.samples = samples_that_fit(left, one_sample, 2 * count);
+        let left = deadline.saturating_duration_since(Instant::now());
+        self.samples = samples_that_fit(left, one_sample);
         Ok(())
+    }
+
+    fn probe(&mut self, view: &View) -> Result<Still> {
+        let View { camera, scene_time } = view;
+        self.renderer
+            .render(camera, *scene_time, PROBE_SAMPLES, self.seed)
     }
 
     /// Of a whole reference, both halves.
@@ -69,14 +86,13 @@ impl References {
     pub(super) fn render(
         &mut self,
         index: u32,
-        camera: &Camera,
-        scene_time: Duration,
+        view: &View,
         progress: impl Fn(),
     ) -> Result<Reference> {
         let mut half = |seed: u32| {
             let still = self
                 .renderer
-                .render(camera, scene_time, self.samples, seed)?;
+                .render(&view.camera, view.scene_time, self.samples, seed)?;
             progress();
             anyhow::Ok(still)
         };
@@ -86,8 +102,9 @@ impl References {
     }
 }
 
-fn samples_that_fit(left: Duration, one_sample: Duration, halves: usize) -> u32 {
-    let samples = left.as_secs_f64() / (one_sample.as_secs_f64() * halves as f64).max(1e-9);
+/// Samples of one half, when one sample of all references takes `one_sample`.
+fn samples_that_fit(left: Duration, one_sample: Duration) -> u32 {
+    let samples = left.as_secs_f64() / (2.0 * one_sample.as_secs_f64()).max(1e-9);
     (samples as u32).clamp(MIN_SAMPLES, MAX_SAMPLES)
 }
 
@@ -139,12 +156,9 @@ mod tests {
     fn samples_fill_the_time_within_bounds() {
         let second = Duration::from_secs(1);
         let millisecond = Duration::from_millis(1);
-        assert_eq!(samples_that_fit(40 * second, 20 * millisecond, 48), 41);
-        assert_eq!(samples_that_fit(Duration::ZERO, second, 48), MIN_SAMPLES);
-        assert_eq!(
-            samples_that_fit(40 * second, Duration::ZERO, 48),
-            MAX_SAMPLES
-        );
+        assert_eq!(samples_that_fit(40 * second, 960 * millisecond), 20);
+        assert_eq!(samples_that_fit(Duration::ZERO, second), MIN_SAMPLES);
+        assert_eq!(samples_that_fit(40 * second, Duration::ZERO), MAX_SAMPLES);
     }
 
     #[test]

@@ -231,37 +231,54 @@ fn stages(text: &mut String, summary: &Summary) -> Result<()> {
 }
 
 fn comparison(text: &mut String, out: &Path, summary: &Summary) -> Result<()> {
-    let (error, reference) = (&summary.error, &summary.reference);
+    let error = &summary.error;
     writeln!(text, "\n## Error\n")?;
+    if error.window < summary.settings.eye_size {
+        writeln!(
+            text,
+            "One square window of {0} x {0} pixels in each of {1} pictures of one eye, before the \
+             lens. The windows stand on a grid, each sample at another place, so that together \
+             they cover the picture evenly. It is windows because a reference is worth something \
+             only with many samples a pixel, and whole pictures of that many would take minutes \
+             on a software driver; `--whole` renders them.\n",
+            error.window, error.frames
+        )?;
+    } else {
+        writeln!(
+            text,
+            "{} whole pictures of one eye, before the lens.\n",
+            error.frames
+        )?;
+    }
     writeln!(
         text,
-        "{} pictures of one eye, before the lens, against references that were path-traced \
-         with {} samples a pixel and as many bounces as the server's light, at the very poses at \
-         which the client drew. Noise of their own puts the references at {:.1} dB: no picture can \
-         be measured to be much better than that.\n",
-        error.frames, reference.samples_per_pixel, reference.noise_psnr_db
+        "The references were path-traced with {} samples a pixel and as many bounces as the \
+         server's light, at the very poses at which the client drew. Noise of their own, measured \
+         as the difference of two halves of the samples, puts them at {:.1} dB: no picture can be \
+         measured to be much better than that.\n",
+        error.reference_samples, error.psnr_reference_ceiling_db
     )?;
-    writeln!(text, "| mean | | |\n|---|---|---|")?;
+    writeln!(text, "| | | |\n|---|---|---|")?;
     for (what, figure, meaning) in [
         (
             "PSNR",
             format!("{:.2} dB", error.psnr_db),
-            "of 8-bit sRGB; higher is better",
+            "of 8-bit sRGB, from the mean squared error over all windows; higher is better",
         ),
         (
             "SSIM",
             format!("{:.4}", error.ssim),
-            "of luma, window of 11 pixels, sigma 2, C1 = 0.0001, C2 = 0.0009; 1 is equal",
+            "of luma, mean; window of 11 pixels, sigma 2, C1 = 0.0001, C2 = 0.0009; 1 is equal",
         ),
         (
             "FLIP",
             format!("{:.4}", error.flip),
-            "at 67 pixels a degree; 0 is equal",
+            "mean, at 67 pixels a degree; 0 is equal",
         ),
         (
             "FLIP unwarped",
             format!("{:.4}", error.flip_unwarped),
-            "had the last server view been shown as it is",
+            "the same windows, had the last server view been shown as it is",
         ),
         (
             "pose age",
@@ -273,7 +290,8 @@ fn comparison(text: &mut String, out: &Path, summary: &Summary) -> Result<()> {
     }
     writeln!(
         text,
-        "\nClient, reference, and FLIP from black (equal) to pale yellow:\n"
+        "\nClient, reference, and FLIP from black (equal) to pale yellow, enlarged where they are \
+         small, for samples from the first to the last:\n"
     )?;
     embed(text, out, "compare_")
 }
@@ -281,18 +299,20 @@ fn comparison(text: &mut String, out: &Path, summary: &Summary) -> Result<()> {
 fn sample_table(text: &mut String, errors: &[SampleError]) -> Result<()> {
     writeln!(
         text,
-        "\n| picture | eye | s | pose age ms | PSNR dB | SSIM | FLIP | FLIP unwarped |"
+        "\n| picture | eye | s | pose age ms | window | PSNR dB | SSIM | FLIP | FLIP unwarped |"
     )?;
-    writeln!(text, "|---|---|---|---|---|---|---|---|")?;
+    writeln!(text, "|---|---|---|---|---|---|---|---|---|")?;
     for error in errors {
         writeln!(
             text,
-            "| [{0}]({0}) | {1} | {2:.2} | {3:.0} | {4:.2} | {5:.4} | {6:.4} | {7:.4} |",
+            "| [{0}]({0}) | {1} | {2:.2} | {3:.0} | {4}, {5} | {6:.2} | {7:.4} | {8:.4} | {9:.4} |",
             error.picture,
             error.eye,
             error.seconds,
             error.pose_age_ms,
-            error.psnr_db,
+            error.window.x,
+            error.window.y,
+            error.psnr_db(),
             error.ssim,
             error.flip,
             error.flip_unwarped

@@ -35,21 +35,29 @@ pub(super) struct Summary {
     pub(super) left_out: Vec<String>,
     pub(super) scene: String,
     pub(super) settings: Settings,
-    pub(super) reference: ReferenceFacts,
     pub(super) machine: Machine,
     /// Wall time from the start of the server to this summary.
     pub(super) demo_seconds: f64,
 }
 
-/// Means over the compared frames.
+/// Over the compared windows, one of each of `frames` pictures.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub(super) struct MeanError {
     pub(super) frames: usize,
+    /// Of the mean of the squared errors: the mean of the ratios would be
+    /// infinite as soon as one window shows nothing but sky.
     pub(super) psnr_db: f64,
     pub(super) ssim: f64,
     pub(super) flip: f64,
     pub(super) flip_unwarped: f64,
     pub(super) pose_age_ms: f64,
+    /// The same as `psnr_db` for the references against themselves without
+    /// noise: no picture can be measured to be much better.
+    pub(super) psnr_reference_ceiling_db: f64,
+    /// Samples a pixel of a reference.
+    pub(super) reference_samples: u32,
+    /// Side of a window, pixels.
+    pub(super) window: u32,
 }
 
 /// Largest resident memory, where the system tells.
@@ -71,14 +79,6 @@ pub(super) struct Settings {
     pub(super) bitrate: f64,
 }
 
-/// How good the references are.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct ReferenceFacts {
-    pub(super) samples_per_pixel: u32,
-    /// Peak signal-to-noise ratio of the reference against itself without noise.
-    pub(super) noise_psnr_db: f64,
-}
-
 /// Where it ran.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Machine {
@@ -95,7 +95,7 @@ impl Summary {
         client: &ClientRecord,
         server: &ServerRecord,
         errors: &[SampleError],
-        samples_per_pixel: u32,
+        reference_samples: u32,
         elapsed: Duration,
     ) -> Self {
         let mean = |figure: fn(&SampleError) -> f64| {
@@ -114,11 +114,16 @@ impl Summary {
             latency_ms: client.latency_ms,
             error: MeanError {
                 frames: errors.len(),
-                psnr_db: mean(|error| error.psnr_db),
+                psnr_db: psnr_from_mean_squared_error(mean(|error| error.mean_squared_error)),
                 ssim: mean(|error| error.ssim),
                 flip: mean(|error| error.flip),
                 flip_unwarped: mean(|error| error.flip_unwarped),
                 pose_age_ms: mean(|error| error.pose_age_ms),
+                psnr_reference_ceiling_db: psnr_from_mean_squared_error(mean(|error| {
+                    error.reference_noise
+                })),
+                reference_samples,
+                window: errors.first().map_or(0, |error| error.window.width),
             },
             peak_memory_bytes: PeakMemory {
                 server: server.peak_memory_bytes,
@@ -137,10 +142,6 @@ impl Summary {
                 eye_size: options.eye_size,
                 display_rate: options.display_rate,
                 bitrate: options.bitrate,
-            },
-            reference: ReferenceFacts {
-                samples_per_pixel,
-                noise_psnr_db: psnr_from_mean_squared_error(mean(|error| error.reference_noise)),
             },
             machine: Machine {
                 processor: processor(),
@@ -172,22 +173,31 @@ pub(super) mod tests {
     use std::path::PathBuf;
 
     use super::*;
-    use crate::demo::recorded::tests::{client, server};
+    use crate::demo::{
+        recorded::tests::{client, server},
+        window::Window,
+    };
 
     pub(in crate::demo) fn errors() -> Vec<SampleError> {
-        let of = |psnr_db| SampleError {
+        let of = |mean_squared_error| SampleError {
             picture: "samples/00.png".into(),
             eye: "left".into(),
             seconds: 5.1,
             pose_age_ms: 230.0,
             frame: 21,
-            psnr_db,
+            window: Window {
+                x: 44,
+                y: 88,
+                width: 80,
+                height: 80,
+            },
+            mean_squared_error,
             ssim: 0.9,
             flip: 0.1,
             flip_unwarped: 0.2,
             reference_noise: 1e-4,
         };
-        vec![of(26.0), of(28.0)]
+        vec![of(0.0), of(4e-3)]
     }
 
     pub(in crate::demo) fn summary() -> Summary {
@@ -202,17 +212,20 @@ pub(super) mod tests {
             bitrate: 20.0,
             seed: 1,
             reference_seconds: 45,
+            whole: false,
         };
         let elapsed = Duration::from_secs(80);
         Summary::new(&options, &client(), &server(), &errors(), 16, elapsed)
     }
 
+    /// Equal windows count, and do not make the whole infinite.
     #[test]
     fn errors_are_means() {
-        let summary = summary();
-        assert_eq!(summary.error.frames, 2);
-        assert_eq!(summary.error.psnr_db, 27.0);
-        assert!((summary.reference.noise_psnr_db - 40.0).abs() < 1e-9);
+        let error = summary().error;
+        assert_eq!(error.frames, 2);
+        assert!((error.psnr_db - 26.9897).abs() < 1e-4, "{}", error.psnr_db);
+        assert!((error.psnr_reference_ceiling_db - 40.0).abs() < 1e-9);
+        assert_eq!((error.reference_samples, error.window), (16, 80));
     }
 
     /// Others read these keys.
@@ -245,6 +258,9 @@ pub(super) mod tests {
             "/error/ssim",
             "/error/flip",
             "/error/flip_unwarped",
+            "/error/psnr_reference_ceiling_db",
+            "/error/reference_samples",
+            "/error/window",
             "/peak_memory_bytes/server",
             "/peak_memory_bytes/client",
         ] {

@@ -18,6 +18,9 @@ use crate::scene::{Alpha, Image, Light, Scene, TextureRef, Wrap};
 const FAINTEST_LAMP: f32 = 1e-9;
 /// Where the object begins in a triangle's last word, above its material.
 const OBJECT_SHIFT: u32 = 20;
+/// Share of what white paper in the open reflects below which a lamp's
+/// contribution is too faint to always be worth a shadow ray.
+const FAINT_SHARE: f32 = 0.01;
 /// Largest share of the largest binding that texels may take; images are
 /// halved until they fit.
 const TEXEL_SHARE: f64 = 0.9;
@@ -113,6 +116,9 @@ impl GpuScene {
             globals.sun_cos = sun.angular_radius.cos();
             globals.sun_irradiance = sun.irradiance.to_array();
         }
+        let open_sky = luminance(scene.sky.zenith + scene.sky.horizon) * 0.5;
+        let sunlit = luminance(Vec3::from(globals.sun_irradiance)) / std::f32::consts::PI;
+        globals.faint = FAINT_SHARE * (open_sky + sunlit);
         let globals_buffer = gpu.uniform("globals", size_of::<Globals>());
         gpu.queue
             .write_buffer(&globals_buffer, 0, bytemuck::bytes_of(&globals));

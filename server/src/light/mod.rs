@@ -9,8 +9,10 @@
 mod paths;
 mod schedule;
 
+use std::collections::HashSet;
+
 use glam::Vec3;
-use shadecast_protocol::Block;
+use shadecast_protocol::{Block, PatchId, Placement};
 use shadecast_shaders::light::{
     ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CarryParameters, LightParameters, Move, NO_BLOCK,
 };
@@ -32,9 +34,10 @@ const MOST_BLOCKS: u64 = 1 << 18;
 pub struct Light {
     atlas_width: u32,
     radiance: wgpu::Buffer,
+    shown: wgpu::Buffer,
     radiance_before: Option<wgpu::Buffer>,
-    squares: wgpu::Buffer,
-    squares_before: Option<wgpu::Buffer>,
+    surfaces: wgpu::Buffer,
+    surfaces_before: Option<wgpu::Buffer>,
     parameters: wgpu::Buffer,
     blocks: wgpu::Buffer,
     noise: wgpu::Buffer,
@@ -43,6 +46,7 @@ pub struct Light {
     start: wgpu::ComputePipeline,
     accumulate: wgpu::ComputePipeline,
     measure: wgpu::ComputePipeline,
+    smooth: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
     carry: wgpu::ComputePipeline,
     carry_layout: wgpu::BindGroupLayout,
@@ -67,17 +71,19 @@ impl Light {
                 Binding::Write,
                 Binding::Write,
                 Binding::Write,
+                Binding::Write,
             ],
         );
         let radiance = gpu.scratch("radiance", texels * 16)?;
-        let squares = gpu.scratch("squares", texels * 4)?;
+        let shown = gpu.scratch("shown", texels * 16)?;
+        let surfaces = gpu.scratch("surfaces", texels * 16)?;
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
         let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
         let noise = gpu.scratch("noise", most_blocks * 4)?;
         let group = bind(
             gpu,
             &own_layout,
-            &[&parameters, &blocks, &radiance, &squares, &noise],
+            &[&parameters, &blocks, &radiance, &surfaces, &noise, &shown],
         );
         let paths = Paths::new(gpu, gpu_scene, texels as u32)?;
         let layouts = [&gpu_scene.layout, &paths.layout, &own_layout];
@@ -100,15 +106,17 @@ impl Light {
             start: pipeline("start_at_texels"),
             accumulate: pipeline("accumulate"),
             measure: pipeline("measure_noise"),
+            smooth: pipeline("smooth_blocks"),
             paths,
             carry: gpu.compute_pipeline(CARRY_SOURCE, "carry_blocks", &[&carry_layout], &[]),
             carry_layout,
             carry_parameters: gpu.uniform("carry parameters", size_of::<CarryParameters>()),
             moves: gpu.scratch("moves", most_blocks * size_of::<Move>() as u64)?,
             radiance,
+            shown,
             radiance_before: None,
-            squares,
-            squares_before: None,
+            surfaces,
+            surfaces_before: None,
             parameters,
             blocks,
             noise_readback: gpu.readback("noise", most_blocks * 4),
@@ -117,10 +125,10 @@ impl Light {
         })
     }
 
-    /// The mean radiance and its weight, four floats a texel, row by row.
+    /// The radiance to show and the samples behind it, four floats a texel, row by row.
     #[must_use]
-    pub fn radiance(&self) -> &wgpu::Buffer {
-        &self.radiance
+    pub fn shown(&self) -> &wgpu::Buffer {
+        &self.shown
     }
 
     /// Gives the blocks of `placed` their first content, and clears the atlas on a reset.
@@ -145,17 +153,18 @@ impl Light {
         let carries = moves.iter().any(|m| m.origin != NO_BLOCK);
         if carries && self.radiance_before.is_none() {
             self.radiance_before = Some(gpu.scratch("radiance before", self.radiance.size())?);
-            self.squares_before = Some(gpu.scratch("squares before", self.squares.size())?);
+            self.surfaces_before = Some(gpu.scratch("surfaces before", self.surfaces.size())?);
         }
-        if let (true, Some(radiance), Some(squares)) =
-            (carries, &self.radiance_before, &self.squares_before)
+        if let (true, Some(radiance), Some(surfaces)) =
+            (carries, &self.radiance_before, &self.surfaces_before)
         {
             encoder.copy_buffer_to_buffer(&self.radiance, 0, radiance, 0, None);
-            encoder.copy_buffer_to_buffer(&self.squares, 0, squares, 0, None);
+            encoder.copy_buffer_to_buffer(&self.surfaces, 0, surfaces, 0, None);
         }
         if placed.reset {
             encoder.clear_buffer(&self.radiance, 0, None);
-            encoder.clear_buffer(&self.squares, 0, None);
+            encoder.clear_buffer(&self.surfaces, 0, None);
+            encoder.clear_buffer(&self.shown, 0, None);
         }
         if moves.is_empty() {
             return Ok(());
@@ -177,9 +186,9 @@ impl Light {
                 &self.carry_parameters,
                 &self.moves,
                 self.radiance_before.as_ref().unwrap_or(&self.blocks),
-                self.squares_before.as_ref().unwrap_or(&self.noise),
+                self.surfaces_before.as_ref().unwrap_or(&self.blocks),
                 &self.radiance,
-                &self.squares,
+                &self.surfaces,
             ],
         );
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -190,7 +199,8 @@ impl Light {
         Ok(())
     }
 
-    /// Traces the paths of `jobs` and tells how noisy each block still is.
+    /// Traces the paths of `jobs`, smooths what they and `placements` changed,
+    /// and tells how noisy each job's block still is.
     ///
     /// # Errors
     /// When the driver fails.
@@ -199,15 +209,27 @@ impl Light {
         gpu: &Gpu,
         gpu_scene: &GpuScene,
         jobs: &[Job],
+        placements: &[Placement],
         eye: Vec3,
     ) -> Result<Vec<f32>, GpuError> {
         let most = (self.blocks.size() / size_of::<BlockRecord>() as u64) as usize;
-        let mut records = Vec::with_capacity(jobs.len().min(most));
+        let mut records = Vec::with_capacity(most.min(jobs.len() + placements.len()));
         let mut path_count = 0;
         for job in jobs.iter().take(most) {
             records.push(job.record(path_count));
             path_count += job.paths();
         }
+        let lit = records.len();
+        let lit_patches: HashSet<PatchId> = jobs.iter().map(Job::patch).collect();
+        let only_moved = placements
+            .iter()
+            .filter(|placement| !lit_patches.contains(&placement.patch));
+        records.extend(only_moved.take(most - lit).map(|placement| BlockRecord {
+            first_job: path_count,
+            position: position_bits(placement.block),
+            layout_bits: level_bits(placement.block),
+            ..Default::default()
+        }));
         if records.is_empty() {
             return Ok(Vec::new());
         }
@@ -229,18 +251,25 @@ impl Light {
         };
         self.paths.follow(gpu, gpu_scene, ends, path_count);
 
-        let bytes = records.len() as u64 * 4;
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&self.measure);
             pass.set_bind_group(0, &gpu_scene.group, &[]);
             pass.set_bind_group(1, &self.paths.group, &[]);
             pass.set_bind_group(2, &self.group, &[]);
+            pass.set_pipeline(&self.measure);
             pass.dispatch_workgroups((records.len() as u32).div_ceil(64), 1, 1);
+            pass.set_pipeline(&self.smooth);
+            let (x, y) = workgroups(records.len() as u32, 1);
+            pass.dispatch_workgroups(x, y, 1);
         }
+        if lit == 0 {
+            gpu.queue.submit([encoder.finish()]);
+            return Ok(Vec::new());
+        }
+        let bytes = lit as u64 * 4;
         encoder.copy_buffer_to_buffer(&self.noise, 0, &self.noise_readback, 0, bytes);
         gpu.submit_and_read(encoder, &self.noise_readback, bytes, |bytes| {
             bytemuck::cast_slice(bytes).to_vec()
@@ -248,13 +277,19 @@ impl Light {
     }
 }
 
+fn position_bits(block: Block) -> u32 {
+    u32::from(block.x) | u32::from(block.y) << 16
+}
+
+fn level_bits(block: Block) -> u32 {
+    u32::from(block.level.width) | u32::from(block.level.height) << 4
+}
+
 fn move_record(new: Block, old: Option<Block>) -> Move {
-    let position = |block: Block| u32::from(block.x) | u32::from(block.y) << 16;
-    let level = |block: Block| u32::from(block.level.width) | u32::from(block.level.height) << 4;
     Move {
-        to: position(new),
-        levels: level(new) | old.map_or(0, level) << 8,
-        origin: old.map_or(NO_BLOCK, position),
+        to: position_bits(new),
+        levels: level_bits(new) | old.map_or(0, level_bits) << 8,
+        origin: old.map_or(NO_BLOCK, position_bits),
         padding: 0,
     }
 }

@@ -10,6 +10,8 @@ use crate::gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout, workgroups};
 
 /// Most paths in flight; more only cost memory.
 const LONGEST_WAVE: u32 = 1 << 18;
+/// Most times that the rays of a wave are traced: bounces and a camera's ray.
+const MOST_STEPS: u32 = 128;
 /// Threads of a workgroup in all kernels here.
 const GROUP: u32 = 64;
 
@@ -20,6 +22,7 @@ pub struct Paths {
     pub layout: wgpu::BindGroupLayout,
     pub(super) group: wgpu::BindGroup,
     wave: wgpu::Buffer,
+    queued: wgpu::Buffer,
     trace: wgpu::ComputePipeline,
     advance: wgpu::ComputePipeline,
     longest_wave: u32,
@@ -53,6 +56,8 @@ impl Paths {
                 Binding::Write,
                 Binding::Write,
                 Binding::Uniform,
+                Binding::Write,
+                Binding::Write,
             ],
         );
         let bytes = u64::from(longest_wave);
@@ -65,11 +70,18 @@ impl Paths {
             gpu.compute_pipeline(TRACE_SOURCE, "trace_rays", &layouts, &gpu_scene.constants);
         let advance =
             gpu.compute_pipeline(ADVANCE_SOURCE, "advance", &layouts, &gpu_scene.constants);
-        let group = bind(gpu, &layout, &[&rays, &hits, &states, &wave]);
+        let queue = gpu.scratch("ray queue", bytes * 3 * 4)?;
+        let queued = gpu.scratch("queue lengths", u64::from(MOST_STEPS) * 4)?;
+        let group = bind(
+            gpu,
+            &layout,
+            &[&rays, &hits, &states, &wave, &queue, &queued],
+        );
         Ok(Self {
             layout,
             group,
             wave,
+            queued,
             trace,
             advance,
             longest_wave,
@@ -86,17 +98,20 @@ impl Paths {
             let wave = Wave {
                 path_count,
                 first_job,
-                cull: 0,
-                padding: 0,
+                ..Default::default()
             };
             for step in 0..steps {
                 let wave = Wave {
                     cull: u32::from(ends.from_camera && step == 0),
+                    step,
                     ..wave
                 };
                 let mut encoder = gpu
                     .device
                     .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+                if step == 0 {
+                    encoder.clear_buffer(&self.queued, 0, None);
+                }
                 gpu.queue
                     .write_buffer(&self.wave, 0, bytemuck::bytes_of(&wave));
                 {

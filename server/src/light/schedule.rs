@@ -32,6 +32,12 @@ pub struct Job {
 }
 
 impl Job {
+    /// Whose block it is.
+    #[must_use]
+    pub fn patch(&self) -> PatchId {
+        self.patch
+    }
+
     /// Paths that it takes.
     #[must_use]
     pub fn paths(&self) -> u32 {

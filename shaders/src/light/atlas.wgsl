@@ -1,7 +1,7 @@
 // Begins paths at texels of placed patches, and accumulates what they bring.
 // One thread per job; jobs of a block are consecutive, `blocks` is ascending
 // in `first_job`. Reads the scene and `blocks`; updates `radiance` (mean and
-// weight) and `squares` (mean of the squared luminance).
+// weight) and `surfaces` (mean base colour, and of the squared luminance).
 // Twin of the mapping: patch_point.rs. Source: SAS 2018, section 3.2; figure 6.
 
 struct LightParameters {
@@ -29,7 +29,7 @@ struct BlockRecord {
 @group(2) @binding(0) var<uniform> parameters: LightParameters;
 @group(2) @binding(1) var<storage, read> blocks: array<BlockRecord>;
 @group(2) @binding(2) var<storage, read_write> radiance: array<vec4<f32>>;
-@group(2) @binding(3) var<storage, read_write> squares: array<f32>;
+@group(2) @binding(3) var<storage, read_write> surfaces: array<vec4<f32>>;
 
 // Weight of a coarse first look that one path gave to several texels.
 const COARSE_WEIGHT: f32 = 0.25;
@@ -151,7 +151,8 @@ fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     state.seed = seed;
     state.sample_index = job.block.sample_index;
     state.progress = 1u;
-    leave_vertex(path, surface, wo, 0u, state);
+    state.albedo = surface.base;
+    leave_vertex(path, surface, wo, 0u, 0u, state);
 }
 
 @compute @workgroup_size(64)
@@ -176,7 +177,7 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
             let history = min(old.w, longest);
             let share = weight_of_sample / (history + weight_of_sample);
             radiance[at] = vec4<f32>(mix(old.rgb, found, share), history + weight_of_sample);
-            squares[at] = mix(squares[at], square, share);
+            surfaces[at] = mix(surfaces[at], vec4<f32>(paths[path].albedo, square), share);
         }
     }
 }

@@ -26,9 +26,9 @@ const CARRIED_WEIGHT: f32 = 12.0;
 @group(0) @binding(0) var<uniform> carry: CarryParameters;
 @group(0) @binding(1) var<storage, read> moves: array<Move>;
 @group(0) @binding(2) var<storage, read> before: array<vec4<f32>>;
-@group(0) @binding(3) var<storage, read> squares_before: array<f32>;
+@group(0) @binding(3) var<storage, read> surfaces_before: array<vec4<f32>>;
 @group(0) @binding(4) var<storage, read_write> radiance: array<vec4<f32>>;
-@group(0) @binding(5) var<storage, read_write> squares: array<f32>;
+@group(0) @binding(5) var<storage, read_write> surfaces: array<vec4<f32>>;
 
 @compute @workgroup_size(64)
 fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -44,7 +44,7 @@ fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         let p = vec2<u32>(i % size.x, i / size.x);
         let at = ((m.to >> 16u) + p.y) * carry.atlas_width + (m.to & 0xffffu) + p.x;
         var content = vec4<f32>(0.0);
-        var square = 0.0;
+        var surface = vec4<f32>(0.0);
         if (m.origin != NO_BLOCK) {
             // Patch coordinates run over texel centres, at both levels.
             let q = vec2<f32>(p) * vec2<f32>(old_size - 1u) / vec2<f32>(size - 1u);
@@ -56,13 +56,13 @@ fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             let r1 = (corner.y + high.y) * carry.atlas_width + corner.x;
             content = mix(mix(before[r0 + low.x], before[r0 + high.x], f.x),
                 mix(before[r1 + low.x], before[r1 + high.x], f.x), f.y);
-            square = mix(mix(squares_before[r0 + low.x], squares_before[r0 + high.x], f.x),
-                mix(squares_before[r1 + low.x], squares_before[r1 + high.x], f.x), f.y);
+            surface = mix(mix(surfaces_before[r0 + low.x], surfaces_before[r0 + high.x], f.x),
+                mix(surfaces_before[r1 + low.x], surfaces_before[r1 + high.x], f.x), f.y);
             if (any(old_size != size)) {
                 content.w = min(content.w, CARRIED_WEIGHT);
             }
         }
         radiance[at] = content;
-        squares[at] = square;
+        surfaces[at] = surface;
     }
 }

@@ -34,8 +34,8 @@ macro_rules! path_source {
 pub const TRACE_SOURCE: &str = concat!(include_str!("scene.wgsl"), include_str!("trace.wgsl"));
 /// Kernel `advance`.
 pub const ADVANCE_SOURCE: &str = path_source!();
-/// Kernels `start_at_texels`, `accumulate` and `measure_noise`.
-pub const ATLAS_SOURCE: &str = path_source!("atlas.wgsl", "noise.wgsl");
+/// Kernels `start_at_texels`, `accumulate`, `measure_noise` and `smooth_blocks`.
+pub const ATLAS_SOURCE: &str = path_source!("atlas.wgsl", "noise.wgsl", "smooth.wgsl");
 /// Kernels `start_at_pixels` and `add_to_pixels`.
 pub const STILL_SOURCE: &str = path_source!("still.wgsl");
 /// Kernel `carry_blocks`.

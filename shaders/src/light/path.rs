@@ -12,8 +12,8 @@ pub struct Wave {
     pub first_job: u32,
     /// 1 where rays onwards do not see single-sided triangles from behind.
     pub cull: u32,
-    /// Zero.
-    pub padding: u32,
+    /// Times that the wave's rays were traced before.
+    pub step: u32,
 }
 
 /// Bytes of the three rays of a path.

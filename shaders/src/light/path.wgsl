@@ -22,7 +22,8 @@ struct PathState {
     sample_index: u32,
     // Width of the sample per metre of the ray onwards.
     cone: f32,
-    padding: vec3<f32>,
+    // Of the first vertex.
+    albedo: vec3<f32>,
 }
 
 @group(1) @binding(2) var<storage, read_write> paths: array<PathState>;
@@ -36,6 +37,8 @@ const PAIRS_PER_VERTEX: u32 = 8u;
 // Candidates drawn from the lamps by power, before one light is chosen.
 const LAMP_CANDIDATES: u32 = 2u;
 const INFINITE: f32 = 3.0e38;
+// Share of the faintest contributions that still get a shadow ray.
+const LEAST_SURVIVAL: f32 = 0.1;
 
 struct LightSample {
     direction: vec3<f32>,
@@ -182,8 +185,13 @@ fn light_sample(s: Surface, wo: vec3<f32>, last: bool, rng: ptr<function, Sample
     return chosen;
 }
 
-fn send(path: u32, slot: u32, origin: vec3<f32>, direction: vec3<f32>, length: f32) {
-    rays[slot * wave.path_count + path] = Ray(origin, length, direction, 0.0);
+// Queues a ray to be traced at `step`; a negative length is none.
+fn send(path: u32, slot: u32, origin: vec3<f32>, direction: vec3<f32>, length: f32, step: u32) {
+    let index = slot * wave.path_count + path;
+    rays[index] = Ray(origin, length, direction, 0.0);
+    if (length >= 0.0) {
+        queue[atomicAdd(&queued[step], 1u)] = index;
+    }
 }
 
 fn send_nothing(path: u32, slot: u32) {
@@ -191,7 +199,7 @@ fn send_nothing(path: u32, slot: u32) {
 }
 
 // Sends the rays of a vertex: what light it gets, and where the path goes on.
-fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, state_in: PathState) {
+fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, state_in: PathState) {
     var state = state_in;
     let last = vertex >= globals.bounces;
     var rng = Sampler(state.sample_index, state.seed, 1u + vertex * PAIRS_PER_VERTEX);
@@ -201,16 +209,22 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, state_in: Pat
     if (HAS_SUN) {
         let sun = sun_sample(s, wo, sample_2d(&rng));
         state.sun = state.throughput * sun.value;
-        send(path, SLOT_SUN, origin, sun.direction, select(-1.0, INFINITE, any(state.sun > vec3<f32>(0.0))));
+        send(path, SLOT_SUN, origin, sun.direction, select(-1.0, INFINITE, any(state.sun > vec3<f32>(0.0))), step);
     } else {
         send_nothing(path, SLOT_SUN);
     }
 
     let light = light_sample(s, wo, last, &rng);
     state.light = state.throughput * light.value;
+    // Russian roulette on what would hardly be seen.
+    let worth = luminance(state.light) / globals.faint;
+    if (worth < 1.0) {
+        let survival = max(worth, LEAST_SURVIVAL);
+        state.light = select(vec3<f32>(0.0), state.light / survival, sample_2d(&rng).x < survival);
+    }
     // Short of the lamp by a few rounding steps.
     send(path, SLOT_LIGHT, origin, light.direction,
-        select(-1.0, light.distance * 0.9999, any(state.light > vec3<f32>(0.0))));
+        select(-1.0, light.distance * 0.9999, any(state.light > vec3<f32>(0.0))), step);
 
     var onwards = false;
     if (!last) {
@@ -222,7 +236,7 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, state_in: Pat
         state.pdf = bsdf.pdf;
         // The next hit is looked at as widely as this lobe spreads.
         state.cone = max(state.cone, s.alpha);
-        send(path, SLOT_ONWARDS, origin, wi, select(-1.0, INFINITE, onwards));
+        send(path, SLOT_ONWARDS, origin, wi, select(-1.0, INFINITE, onwards), step);
     } else {
         send_nothing(path, SLOT_ONWARDS);
     }
@@ -281,7 +295,7 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     state.radiance += state.throughput * s.emissive * weight;
     let vertex = state.progress & 0xffffu;
     state.progress += 1u;
-    leave_vertex(path, s, wo, vertex, state);
+    leave_vertex(path, s, wo, vertex, wave.step + 1u, state);
 }
 
 // What a finished path brings; nothing where arithmetic failed.

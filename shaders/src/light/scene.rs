@@ -30,6 +30,12 @@ pub struct Globals {
     pub sun_irradiance: [f32; 3],
     /// Indirect bounces.
     pub bounces: u32,
+    /// Luminance of a contribution too faint to always be worth a shadow ray.
+    pub faint: f32,
+    /// Zero.
+    pub spare: f32,
+    /// Zero.
+    pub padding: [f32; 2],
 }
 
 /// Where a texture's texels are and how they are read.

@@ -11,7 +11,8 @@ struct Wave {
     first_job: u32,
     // 1 where rays onwards do not see single-sided triangles from behind.
     cull: u32,
-    padding: u32,
+    // Times that the wave's rays were traced before.
+    step: u32,
 }
 
 // What the loaded scene uses; what it does not use is compiled away.
@@ -35,6 +36,10 @@ struct Globals {
     sun_cos: f32,
     sun_irradiance: vec3<f32>,
     bounces: u32,
+    // Luminance of a contribution too faint to always be worth a shadow ray.
+    faint: f32,
+    spare: f32,
+    padding: vec2<f32>,
 }
 
 // Four of the slots of a glTF material: base colour, metallic-roughness, normal, emissive.

@@ -37,7 +37,7 @@ fn start_at_pixels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     paths[path] = state;
     send_nothing(path, SLOT_SUN);
     send_nothing(path, SLOT_LIGHT);
-    send(path, SLOT_ONWARDS, transform_point(still.world_from_eye, vec3<f32>(0.0)), direction, INFINITE);
+    send(path, SLOT_ONWARDS, transform_point(still.world_from_eye, vec3<f32>(0.0)), direction, INFINITE, 0u);
 }
 
 @compute @workgroup_size(64)

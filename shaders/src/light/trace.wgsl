@@ -24,6 +24,12 @@ struct Hit {
 // Length, triangle and NEAR_MOVER, weights of corners 1 and 2.
 @group(1) @binding(1) var<storage, read_write> hits: array<vec4<u32>>;
 
+// Rays of this step, in no particular order: what each finds goes to its own
+// place, so that the order in which threads arrive cannot show.
+@group(1) @binding(4) var<storage, read_write> queue: array<u32>;
+// Length of the queue at each step.
+@group(1) @binding(5) var<storage, read_write> queued: array<atomic<u32>>;
+
 // Set in a hit's triangle when the ray came near a moving object.
 const NEAR_MOVER: u32 = 0x80000000u;
 // The triangle of a hit that is none.
@@ -177,19 +183,17 @@ fn is_masked(triangle: u32) -> bool {
     return materials[triangles[triangle].w & MATERIAL_MASK].alpha_cutoff >= 0.0;
 }
 
-// Traces the rays of all paths of a wave: one thread per ray, slot by slot.
+// Traces the queued rays of a wave: one thread per ray.
 // A kernel of its own, because drivers that run threads in lockstep pay for
 // every line of a loop whether or not a lane needs it.
 @compute @workgroup_size(64)
 fn trace_rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let index = id.x + id.y * groups.x * 64u;
-    if (index >= wave.path_count * 3u) {
+    let place = id.x + id.y * groups.x * 64u;
+    if (place >= atomicLoad(&queued[wave.step])) {
         return;
     }
+    let index = queue[place];
     let ray = rays[index];
-    if (ray.length < 0.0) {
-        return;
-    }
     let slot = index / wave.path_count;
     let onwards = slot == 2u;
     var near_mover = false;

@@ -1,0 +1,103 @@
+//! The whole path from the head to the display, in virtual time.
+
+use std::{sync::Arc, time::Duration};
+
+use shadecast_client::{
+    AccessUnit, ClientTiming, Decoder, OpenH264Decoder, Ticket, World, YuvPicture,
+};
+use shadecast_protocol::{Picture, ToClient, Update};
+use shadecast_server::scene::courtyard;
+use shadecast_tests::{ATLAS_SIZE, Loopback};
+
+const FRAMES: usize = 12;
+
+fn run(seed: u64) -> Loopback {
+    let mut loopback = Loopback::new(courtyard(10_000), seed).expect("a GPU");
+    loopback
+        .run_until_presented(FRAMES)
+        .expect("both ends understand each other");
+    loopback
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn frames_take_effect_whole_and_a_seed_is_a_run() {
+    let first = run(1);
+    picture_and_update_take_effect_together(&first);
+    both_ends_measure_the_network(&first);
+
+    let second = run(1);
+    assert_eq!(first.sent().len(), second.sent().len());
+    for (index, (one, other)) in first.sent().iter().zip(second.sent()).enumerate() {
+        let message = ToClient::decode(one).expect("a message");
+        assert!(one == other, "message {index} differs: {message:?}");
+    }
+}
+
+/// What is shown is the picture of a frame and the world after its update, and
+/// never those of two frames.
+fn picture_and_update_take_effect_together(loopback: &Loopback) {
+    let (updates, pictures) = frames_sent(loopback);
+    let mut decoder = OpenH264Decoder::new();
+    let mut world = World::new(ATLAS_SIZE);
+    let mut shown = loopback.presented().iter().peekable();
+    for (update, picture) in updates.iter().zip(&pictures) {
+        let frame = update.frame;
+        assert_eq!(picture.frame, frame, "updates and pictures alternate");
+        world.apply(update).expect("the update fits");
+        let picture = Arc::new(decode(&mut decoder, picture));
+        let expected = world.frame(update, picture, ClientTiming::default());
+        let Some(shown) = shown.next_if(|shown| shown.frame == frame) else {
+            continue;
+        };
+        assert_eq!(shown.epoch, expected.epoch);
+        assert_eq!(shown.world_from_head, expected.world_from_head);
+        assert!(shown.picture == expected.picture, "picture of {frame:?}");
+        assert_eq!(shown.vertices, expected.vertices, "{frame:?}");
+        assert_eq!(shown.indices, expected.indices, "{frame:?}");
+        assert_eq!(shown.transforms, expected.transforms, "{frame:?}");
+        assert!(shown.patches > 100, "{} patches", shown.patches);
+        let bright = shown.picture.y.iter().filter(|luma| **luma > 60).count();
+        assert!(bright > shown.picture.y.len() / 10, "{bright} lit texels");
+    }
+    assert!(shown.next().is_none(), "frames are shown in order");
+    assert_eq!(loopback.presented().len(), FRAMES);
+}
+
+fn frames_sent(loopback: &Loopback) -> (Vec<Update>, Vec<Picture>) {
+    let (mut updates, mut pictures) = (Vec::new(), Vec::new());
+    for bytes in loopback.sent() {
+        match ToClient::decode(bytes).expect("a message") {
+            ToClient::Update(update) => updates.push(update),
+            ToClient::Picture(picture) => pictures.push(picture),
+            _ => {}
+        }
+    }
+    (updates, pictures)
+}
+
+fn decode(decoder: &mut OpenH264Decoder, picture: &Picture) -> YuvPicture {
+    let unit = AccessUnit {
+        ticket: Ticket {
+            connection: 0,
+            frame: picture.frame,
+        },
+        restart: false,
+        size: ATLAS_SIZE,
+        bytes: picture.bytes.clone(),
+    };
+    decoder.send(unit).expect("the decoder takes it");
+    let decoded = decoder.poll().expect("an answer to every access unit");
+    decoded.picture.expect("a picture")
+}
+
+fn both_ends_measure_the_network(loopback: &Loopback) {
+    // Half the jitter is what a sample may be off.
+    let error = loopback.clock_error().expect("clock samples were taken");
+    assert!(error <= Duration::from_millis(6), "{error:?}");
+    // A report's way, a frame's making and a picture's way, each with its jitter,
+    // and the age of the report when the frame begins.
+    let latency = loopback.latency().expect("frames were acknowledged");
+    let possible = Duration::from_millis(28)..Duration::from_millis(100);
+    assert!(possible.contains(&latency), "{latency:?}");
+}
