@@ -268,7 +268,7 @@ impl Server<'_> {
         self.status
             .print(&format!("streaming to {}", client.connection.address));
         if let Some(old) = self.client.replace(client) {
-            old.connection.send(Box::new(ToClient::Bye));
+            old.connection.send(ToClient::Bye);
             old.connection.close("another client took its place");
         }
         false

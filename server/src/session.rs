@@ -65,9 +65,13 @@ pub enum Input {
 
 /// What a session wants done.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "an output is handed over at once; only a few ever wait"
+)]
 pub enum Output {
     /// Tell the client.
-    Send(Box<ToClient>),
+    Send(ToClient),
     /// End the connection.
     Close(String),
 }
@@ -235,7 +239,7 @@ impl Session {
                 *latency += (seconds - *latency) * LATENCY_WEIGHT;
             }
             (State::Streaming(stream), ToServer::RequestReset(_)) => stream.reset = true,
-            (_, ToServer::Bye) => self.close("it said goodbye".to_owned()),
+            (State::Streaming(_), ToServer::Bye) => self.close("it said goodbye".to_owned()),
             (State::Closed, _) => {}
         }
     }
@@ -251,14 +255,12 @@ impl Session {
         };
         if let Some(refusal) = refusal {
             self.outputs
-                .push_back(Output::Send(Box::new(ToClient::Refused(refusal))));
+                .push_back(Output::Send(ToClient::Refused(refusal)));
             self.close(format!("it was refused: {refusal}"));
             return;
         }
         self.outputs
-            .push_back(Output::Send(Box::new(ToClient::Welcome(
-                self.config.welcome.clone(),
-            ))));
+            .push_back(Output::Send(ToClient::Welcome(self.config.welcome.clone())));
         self.state = State::Streaming(Box::new(Stream {
             next_frame: FrameId(0),
             view: None,
@@ -283,9 +285,9 @@ impl Session {
             *speed += (measured - *speed) * SPEED_WEIGHT;
         }
         self.outputs
-            .push_back(Output::Send(Box::new(ToClient::Update(frame.update))));
+            .push_back(Output::Send(ToClient::Update(frame.update)));
         self.outputs
-            .push_back(Output::Send(Box::new(ToClient::Picture(frame.picture))));
+            .push_back(Output::Send(ToClient::Picture(frame.picture)));
     }
 
     fn close(&mut self, reason: String) {

@@ -8,4 +8,4 @@ mod link;
 mod loopback;
 
 pub use link::{Link, Order};
-pub use loopback::{ATLAS_SIZE, Loopback};
+pub use loopback::{ATLAS_SIZE, DELAY, JITTER, Loopback, MAKING};

@@ -9,8 +9,8 @@ use shadecast_client::{
     SessionConfig as ClientConfig,
 };
 use shadecast_protocol::{
-    ClientTime, ClockReply, Codec, EyeView, Fov, Pose, Secret, ServerTime, Sky, ToClient, ToServer,
-    Welcome,
+    ClientTime, ClockReply, Codec, EyeView, Fov, FrameId, Pose, Secret, ServerTime, Sky, ToClient,
+    ToServer, Welcome,
 };
 use shadecast_server::{
     Frame, Gpu, GpuScene, Pipeline, Session as Server, SessionConfig as ServerConfig,
@@ -26,7 +26,11 @@ const STEP: Duration = Duration::from_millis(1);
 /// Between two samples of the head: a display of 100 Hz.
 const VIEW_PERIOD: Duration = Duration::from_millis(10);
 /// How long the server makes a frame, in virtual time.
-const MAKING: Duration = Duration::from_millis(20);
+pub const MAKING: Duration = Duration::from_millis(20);
+/// Of every message.
+pub const DELAY: Duration = Duration::from_millis(4);
+/// Longer than a frame, so that pictures overtake each other.
+pub const JITTER: Duration = Duration::from_millis(40);
 /// What the client's clock shows when the server's shows zero.
 const CLIENT_AHEAD: Duration = Duration::from_secs(3);
 /// Of every frame: the same work, however fast the machine is.
@@ -55,6 +59,7 @@ pub struct Loopback {
     downstream: Link,
     /// When the pictures that are in flight will be there.
     pictures_arrive: Vec<Duration>,
+    lost: Option<FrameId>,
     sent: Vec<Vec<u8>>,
     presented: Vec<Arc<ClientFrame>>,
 }
@@ -97,7 +102,7 @@ impl Loopback {
             light_budget: Duration::from_millis(10),
             head_samples: 2,
         };
-        let link = |seed| Link::new(seed, Duration::from_millis(4), Duration::from_millis(12));
+        let link = |seed| Link::new(seed, DELAY, JITTER);
         Ok(Self {
             now: Duration::ZERO,
             spawn,
@@ -113,9 +118,15 @@ impl Loopback {
             upstream: link(seed),
             downstream: link(!seed),
             pictures_arrive: Vec::new(),
+            lost: None,
             sent: Vec::new(),
             presented: Vec::new(),
         })
+    }
+
+    /// The network will lose the picture of `frame`.
+    pub fn lose_picture(&mut self, frame: FrameId) {
+        self.lost = Some(frame);
     }
 
     /// Lets virtual time pass until the client has presented `frames` frames.
@@ -135,7 +146,7 @@ impl Loopback {
         Ok(())
     }
 
-    /// Every message that the server has sent, as bytes.
+    /// Every message that the server has sent, as bytes; with the lost one.
     #[must_use]
     pub fn sent(&self) -> &[Vec<u8>] {
         &self.sent
@@ -205,7 +216,7 @@ impl Loopback {
         }
         while let Some(output) = server.poll_output() {
             match output {
-                Output::Send(message) => self.send_to_client(*message)?,
+                Output::Send(message) => self.send_to_client(message)?,
                 Output::Close(reason) => bail!("the server closed: {reason}"),
             }
         }
@@ -219,11 +230,18 @@ impl Loopback {
             ToClient::Clock(_) | ToClient::Picture(_) => Order::Free,
             _ => Order::InOrder,
         };
-        let arrival = self.downstream.send(self.now, order, bytes.clone());
-        if matches!(message, ToClient::Picture(_)) {
+        self.sent.push(bytes.clone());
+        let picture = match message {
+            ToClient::Picture(picture) => Some(picture.frame),
+            _ => None,
+        };
+        if picture.is_some() && picture == self.lost {
+            return Ok(());
+        }
+        let arrival = self.downstream.send(self.now, order, bytes);
+        if picture.is_some() {
             self.pictures_arrive.push(arrival);
         }
-        self.sent.push(bytes);
         Ok(())
     }
 

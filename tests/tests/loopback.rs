@@ -5,14 +5,17 @@ use std::{sync::Arc, time::Duration};
 use shadecast_client::{
     AccessUnit, ClientTiming, Decoder, OpenH264Decoder, Ticket, World, YuvPicture,
 };
-use shadecast_protocol::{Picture, ToClient, Update};
+use shadecast_protocol::{FrameId, Picture, ToClient, Update};
 use shadecast_server::scene::courtyard;
-use shadecast_tests::{ATLAS_SIZE, Loopback};
+use shadecast_tests::{ATLAS_SIZE, DELAY, JITTER, Loopback, MAKING};
 
 const FRAMES: usize = 12;
 
-fn run(seed: u64) -> Loopback {
+fn run(seed: u64, lost: Option<FrameId>) -> Loopback {
     let mut loopback = Loopback::new(courtyard(10_000), seed).expect("a GPU");
+    if let Some(frame) = lost {
+        loopback.lose_picture(frame);
+    }
     loopback
         .run_until_presented(FRAMES)
         .expect("both ends understand each other");
@@ -22,16 +25,31 @@ fn run(seed: u64) -> Loopback {
 #[test]
 #[ignore = "needs a Vulkan driver"]
 fn frames_take_effect_whole_and_a_seed_is_a_run() {
-    let first = run(1);
+    let first = run(1, None);
     picture_and_update_take_effect_together(&first);
     both_ends_measure_the_network(&first);
 
-    let second = run(1);
+    let second = run(1, None);
     assert_eq!(first.sent().len(), second.sent().len());
     for (index, (one, other)) in first.sent().iter().zip(second.sent()).enumerate() {
         let message = ToClient::decode(one).expect("a message");
         assert!(one == other, "message {index} differs: {message:?}");
     }
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn after_a_lost_picture_a_new_epoch_is_shown_whole() {
+    let lost = FrameId(4);
+    let loopback = run(2, Some(lost));
+    picture_and_update_take_effect_together(&loopback);
+    let (before, after): (Vec<_>, Vec<_>) = loopback
+        .presented()
+        .iter()
+        .partition(|shown| shown.frame < lost);
+    let (last, first) = (before[before.len() - 1], after[0]);
+    assert_eq!(last.frame, FrameId(3), "all before the loss is shown");
+    assert!(first.frame > lost && first.epoch > last.epoch);
 }
 
 /// What is shown is the picture of a frame and the world after its update, and
@@ -92,12 +110,12 @@ fn decode(decoder: &mut OpenH264Decoder, picture: &Picture) -> YuvPicture {
 }
 
 fn both_ends_measure_the_network(loopback: &Loopback) {
-    // Half the jitter is what a sample may be off.
+    // A sample is off by half the difference between the ways there and back.
     let error = loopback.clock_error().expect("clock samples were taken");
-    assert!(error <= Duration::from_millis(6), "{error:?}");
-    // A report's way, a frame's making and a picture's way, each with its jitter,
-    // and the age of the report when the frame begins.
+    assert!(error <= JITTER / 2, "{error:?}");
+    // A report's way, its wait for the next frame, the making and the way back.
     let latency = loopback.latency().expect("frames were acknowledged");
-    let possible = Duration::from_millis(28)..Duration::from_millis(100);
+    let shortest = 2 * DELAY + MAKING;
+    let possible = shortest..shortest + 2 * JITTER + Duration::from_millis(100);
     assert!(possible.contains(&latency), "{latency:?}");
 }

@@ -266,6 +266,11 @@ fn comparison(text: &mut String, out: &Path, summary: &Summary) -> Result<()> {
             "of 8-bit sRGB, from the mean squared error over all windows; higher is better",
         ),
         (
+            "PSNR without noise",
+            format!("{:.2} dB", error.psnr_without_reference_noise_db),
+            "the same, the squared error that is the references' own noise taken off",
+        ),
+        (
             "SSIM",
             format!("{:.4}", error.ssim),
             "of luma, mean; window of 11 pixels, sigma 2, C1 = 0.0001, C2 = 0.0009; 1 is equal",

@@ -54,6 +54,9 @@ pub(super) struct MeanError {
     /// The same as `psnr_db` for the references against themselves without
     /// noise: no picture can be measured to be much better.
     pub(super) psnr_reference_ceiling_db: f64,
+    /// The same as `psnr_db` with the references' noise taken off: its squared
+    /// error and the client's add up, since neither knows of the other.
+    pub(super) psnr_without_reference_noise_db: f64,
     /// Samples a pixel of a reference.
     pub(super) reference_samples: u32,
     /// Side of a window, pixels.
@@ -101,6 +104,8 @@ impl Summary {
         let mean = |figure: fn(&SampleError) -> f64| {
             errors.iter().map(figure).sum::<f64>() / errors.len() as f64
         };
+        let squared_error = mean(|error| error.mean_squared_error);
+        let noise = mean(|error| error.reference_noise);
         Self {
             server_updates_per_second: server.updates_per_second,
             client_frames_per_second: client.frames_per_second,
@@ -114,14 +119,15 @@ impl Summary {
             latency_ms: client.latency_ms,
             error: MeanError {
                 frames: errors.len(),
-                psnr_db: psnr_from_mean_squared_error(mean(|error| error.mean_squared_error)),
+                psnr_db: psnr_from_mean_squared_error(squared_error),
                 ssim: mean(|error| error.ssim),
                 flip: mean(|error| error.flip),
                 flip_unwarped: mean(|error| error.flip_unwarped),
                 pose_age_ms: mean(|error| error.pose_age_ms),
-                psnr_reference_ceiling_db: psnr_from_mean_squared_error(mean(|error| {
-                    error.reference_noise
-                })),
+                psnr_reference_ceiling_db: psnr_from_mean_squared_error(noise),
+                psnr_without_reference_noise_db: psnr_from_mean_squared_error(
+                    (squared_error - noise).max(0.0),
+                ),
                 reference_samples,
                 window: errors.first().map_or(0, |error| error.window.width),
             },
@@ -211,7 +217,7 @@ pub(super) mod tests {
             display_rate: 30,
             bitrate: 20.0,
             seed: 1,
-            reference_seconds: 45,
+            reference_seconds: 50,
             whole: false,
         };
         let elapsed = Duration::from_secs(80);
@@ -225,6 +231,8 @@ pub(super) mod tests {
         assert_eq!(error.frames, 2);
         assert!((error.psnr_db - 26.9897).abs() < 1e-4, "{}", error.psnr_db);
         assert!((error.psnr_reference_ceiling_db - 40.0).abs() < 1e-9);
+        let without_noise = error.psnr_without_reference_noise_db;
+        assert!((without_noise - 27.2125).abs() < 1e-4, "{without_noise}");
         assert_eq!((error.reference_samples, error.window), (16, 80));
     }
 
@@ -259,6 +267,7 @@ pub(super) mod tests {
             "/error/flip",
             "/error/flip_unwarped",
             "/error/psnr_reference_ceiling_db",
+            "/error/psnr_without_reference_noise_db",
             "/error/reference_samples",
             "/error/window",
             "/peak_memory_bytes/server",

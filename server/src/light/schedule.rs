@@ -167,11 +167,21 @@ impl Schedule {
         }
         others.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.patch.cmp(&b.1.patch)));
         for (_, job) in others {
-            let paths = u64::from(job.paths());
-            if paths > left {
-                break;
-            }
-            left -= paths;
+            // What had only a coarse look may be refined step by step.
+            let coarse = self.lit[job.patch.0 as usize].worth < 1.0;
+            let (limit, coarsest) = if coarse {
+                (left / 2, COARSEST)
+            } else {
+                (left, 1)
+            };
+            let refined = (0..coarsest)
+                .map(|log2_stride| Job { log2_stride, ..job })
+                .find(|job| u64::from(job.paths()) <= limit);
+            // A block larger than the whole budget still gets its turn.
+            let Some(job) = refined.or_else(|| jobs.is_empty().then_some(job)) else {
+                continue;
+            };
+            left = left.saturating_sub(u64::from(job.paths()));
             jobs.push(job);
         }
         jobs

@@ -44,9 +44,9 @@ enum Outgoing {
 }
 
 impl Connection {
-    pub(super) fn send(&self, message: Box<ToClient>) {
+    pub(super) fn send(&self, message: ToClient) {
         // Fails only when the connection is over, which arrives as an event.
-        let _ = self.outbox.send(Outgoing::Message(message));
+        let _ = self.outbox.send(Outgoing::Message(Box::new(message)));
     }
 
     pub(super) fn close(&self, reason: &str) {

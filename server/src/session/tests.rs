@@ -107,6 +107,10 @@ impl Session {
             received: at(0),
             message,
         });
+        self.says()
+    }
+
+    fn says(&mut self) -> Vec<Output> {
         std::iter::from_fn(|| self.poll_output()).collect()
     }
 
@@ -135,8 +139,8 @@ fn viewing() -> Session {
 }
 
 /// What a client that is sent away hears: a refusal at most, and no welcome.
-fn assert_closed(session: &Session, outputs: &[Output], refusal: Option<Refusal>) {
-    let refused = match outputs {
+fn assert_closed(session: &Session, said: &[Output], refusal: Option<Refusal>) {
+    let refused = match said {
         [Output::Close(_)] => None,
         [Output::Send(ToClient::Refused(refusal)), Output::Close(_)] => Some(*refusal),
         other => panic!("{other:?}"),
@@ -150,10 +154,10 @@ fn a_wrong_secret_is_refused() {
     let mut session = session();
     let mut secret = SECRET;
     secret.0[15] ^= 1;
-    let outputs = session.hears(ToServer::Hello(Hello { secret, ..hello() }));
-    assert_closed(&session, &outputs, Some(Refusal::Secret));
-    let outputs = session.hears(ToServer::Hello(hello()));
-    assert!(outputs.is_empty(), "there is no second try: {outputs:?}");
+    let said = session.hears(ToServer::Hello(Hello { secret, ..hello() }));
+    assert_closed(&session, &said, Some(Refusal::Secret));
+    let said = session.hears(ToServer::Hello(hello()));
+    assert!(said.is_empty(), "there is no second try: {said:?}");
     assert!(session.order_frame(at(100), 0).is_none());
 }
 
@@ -169,8 +173,8 @@ fn a_client_that_cannot_decode_the_atlas_is_refused() {
     };
     for hello in [small, no_codec] {
         let mut session = session();
-        let outputs = session.hears(ToServer::Hello(hello));
-        assert_closed(&session, &outputs, Some(Refusal::Capabilities));
+        let said = session.hears(ToServer::Hello(hello));
+        assert_closed(&session, &said, Some(Refusal::Capabilities));
     }
 }
 
@@ -182,8 +186,8 @@ fn the_secret_is_asked_before_anything_is_told() {
         codecs: Vec::new(),
     };
     let mut session = session();
-    let outputs = session.hears(ToServer::Hello(stranger));
-    assert_closed(&session, &outputs, Some(Refusal::Secret));
+    let said = session.hears(ToServer::Hello(stranger));
+    assert_closed(&session, &said, Some(Refusal::Secret));
 }
 
 #[test]
@@ -199,23 +203,23 @@ fn nothing_is_heard_before_hello() {
         ToServer::Bye,
     ] {
         let mut session = session();
-        let outputs = session.hears(message);
-        assert_closed(&session, &outputs, None);
+        let said = session.hears(message);
+        assert_closed(&session, &said, None);
     }
 }
 
 #[test]
 fn hello_is_said_once() {
     let mut session = streaming();
-    let outputs = session.hears(ToServer::Hello(hello()));
-    assert_closed(&session, &outputs, None);
+    let said = session.hears(ToServer::Hello(hello()));
+    assert_closed(&session, &said, None);
 }
 
 #[test]
 fn a_session_ends_once() {
     let mut session = viewing();
-    let outputs = session.hears(ToServer::Bye);
-    assert_closed(&session, &outputs, None);
+    let said = session.hears(ToServer::Bye);
+    assert_closed(&session, &said, None);
     for message in [
         ToServer::Bye,
         ToServer::View(view(1)),
@@ -232,8 +236,8 @@ fn who_never_says_hello_is_sent_away() {
     assert!(session.order_frame(at(5_000), 0).is_none());
     assert!(session.poll_output().is_none());
     assert!(session.order_frame(at(5_001), 0).is_none());
-    let outputs: Vec<_> = std::iter::from_fn(|| session.poll_output()).collect();
-    assert_closed(&session, &outputs, None);
+    let said = session.says();
+    assert_closed(&session, &said, None);
 }
 
 #[test]
@@ -257,9 +261,8 @@ fn frames_keep_their_period() {
         assert_eq!(order.frame, FrameId(number));
         assert_eq!(order.new_client, number == 0, "what was told stays told");
         assert_eq!(order.reset, number == 0);
-        let outputs: Vec<_> = std::iter::from_fn(|| session.poll_output()).collect();
         assert!(matches!(
-            &outputs[..],
+            &session.says()[..],
             [Output::Send(ToClient::Update(update)), Output::Send(ToClient::Picture(picture))]
                 if update.frame == order.frame && picture.frame == order.frame
         ));
@@ -327,7 +330,7 @@ fn the_horizon_follows_the_latency_and_stays_bounded() {
     };
     let mut session = viewing();
     assert!((horizon(&mut session, at(100)) - FIRST_HORIZON.as_secs_f32()).abs() < 1e-4);
-    let mut acknowledge = |session: &mut Session, motion_to_photon| {
+    let acknowledge = |session: &mut Session, motion_to_photon| {
         session.hears(ToServer::Acknowledge(Acknowledgement {
             frame: FrameId(0),
             motion_to_photon,

@@ -1,0 +1,186 @@
+//! Surfaces whose radiance is known without a path tracer.
+
+use std::time::Duration;
+
+use glam::{Affine2, Quat, Vec2, Vec3, Vec4, vec2, vec3};
+use shadecast_protocol::{Fov, ObjectId, Pose};
+use shadecast_server::{
+    scene::{Corner, Image, Light, Material, Scene, SkyModel, TextureRef, Triangle, Wrap},
+    still::{Camera, StillRenderer},
+};
+
+/// Between the middles of two squares, metres.
+const SPACING: f32 = 4.0;
+/// Samples a pixel, of 16 x 16 pixels: the noise of a mean is below a percent.
+const SAMPLES: u32 = 64;
+const SIDE: u32 = 16;
+
+/// One square of two metres for each material, side by side in the plane z = 0
+/// and facing +Z. No point of a plane sees another, so that one bounce is all.
+fn squares(materials: Vec<Material>) -> Scene {
+    let mut scene = Scene::default();
+    for (square, _) in (0..).zip(&materials) {
+        let first = scene.positions.len() as u32;
+        for uv in [
+            vec2(0.0, 0.0),
+            vec2(1.0, 0.0),
+            vec2(1.0, 1.0),
+            vec2(0.0, 1.0),
+        ] {
+            let place = (uv - Vec2::splat(0.5)) * 2.0;
+            let position = middle_of(square) + place.extend(0.0);
+            scene.positions.push(position);
+            scene.corners.push(Corner {
+                normal: Vec3::Z,
+                tangent: Vec4::ZERO,
+                uv: [uv; 2],
+                color: Vec4::ONE,
+            });
+        }
+        for corners in [[0, 1, 2], [0, 2, 3]].map(|corners| corners.map(|c| first + c)) {
+            scene.triangles.push(Triangle {
+                positions: corners,
+                corners,
+                material: square,
+                object: ObjectId::WORLD,
+            });
+        }
+    }
+    scene.materials = materials;
+    scene
+}
+
+fn middle_of(square: u32) -> Vec3 {
+    Vec3::X * SPACING * square as f32
+}
+
+/// The mean radiance of a square seen at `angle` from its normal. The picture
+/// is narrow enough to hold nothing else.
+fn seen(renderer: &mut StillRenderer, square: u32, angle: f32) -> Vec3 {
+    let orientation = Quat::from_rotation_x(-angle);
+    let camera = Camera {
+        world_from_eye: Pose {
+            position: middle_of(square) + orientation * Vec3::Z * 3.0,
+            orientation,
+        },
+        fov: Fov::symmetric(0.1),
+        width: SIDE,
+        height: SIDE,
+    };
+    let still = renderer
+        .render(&camera, Duration::ZERO, SAMPLES, 1)
+        .expect("a picture");
+    still.radiance.iter().sum::<Vec3>() / still.radiance.len() as f32
+}
+
+/// Lambert's surface: where the refractive index does not change, nothing is
+/// reflected but at grazing angles.
+fn matte(base_color: Vec3) -> Material {
+    Material {
+        base_color: base_color.extend(1.0),
+        metallic: 0.0,
+        ior: 1.0,
+        ..Material::default()
+    }
+}
+
+/// White.
+fn metal(roughness: f32) -> Material {
+    Material {
+        roughness,
+        ..Material::default()
+    }
+}
+
+fn assert_near(found: Vec3, expected: Vec3, tolerance: f32) {
+    let off = (found - expected).abs();
+    assert!(
+        off.cmple(expected * tolerance).all(),
+        "{found} instead of {expected}"
+    );
+}
+
+/// In a white furnace a surface is as bright as its albedo in that direction.
+///
+/// The expected values integrate glTF's BSDF (appendix B) over the hemisphere
+/// numerically. What the rough ones lack of 1 would scatter again between their
+/// facets. The glossy dielectric exceeds it: glTF mixes base and coat by the
+/// half vector's Fresnel term, which does not conserve energy away from the
+/// normal.
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_white_furnace_shows_the_albedo() {
+    let coated = |roughness| Material {
+        roughness,
+        ior: 1.5,
+        ..matte(Vec3::ONE)
+    };
+    let angles = [0.0, 1.0];
+    let materials_and_albedos = [
+        (matte(Vec3::ONE), [1.0, 0.9983]),
+        (coated(1.0), [0.9722, 0.9757]),
+        (coated(0.3), [0.9995, 1.0168]),
+        (metal(0.1), [1.0, 0.9998]),
+        (metal(0.5), [0.9158, 0.8631]),
+        (metal(1.0), [0.3069, 0.4340]),
+    ];
+    let (materials, albedos): (Vec<_>, Vec<_>) = materials_and_albedos.into_iter().unzip();
+    let mut scene = squares(materials);
+    scene.sky = SkyModel::constant(Vec3::ONE);
+    let mut renderer = StillRenderer::new(&scene).expect("a GPU");
+    for (square, albedos) in (0..).zip(albedos) {
+        for (angle, albedo) in angles.into_iter().zip(albedos) {
+            let radiance = seen(&mut renderer, square, angle);
+            assert_near(radiance, Vec3::splat(albedo), 0.01);
+        }
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn sunlit_and_glowing_squares_have_the_radiance_that_was_asked_for() {
+    // Images are kept as square roots in eight bits, a percent at worst here.
+    let texel = [200, 150, 100, 255];
+    let glow = vec3(2.0, 0.5, 7.0);
+    let grey = vec3(0.5, 0.25, 0.75);
+    let one_texel = TextureRef {
+        image: 0,
+        uv_set: 0,
+        transform: Affine2::IDENTITY,
+        wrap: [Wrap::Repeat; 2],
+        linear: true,
+    };
+    let mut scene = squares(vec![
+        matte(grey),
+        Material {
+            base_color_texture: Some(one_texel),
+            ..matte(Vec3::ONE)
+        },
+        Material {
+            emissive: glow,
+            ..matte(Vec3::ZERO)
+        },
+    ]);
+    scene.images = vec![Image {
+        name: "one texel".to_owned(),
+        width: 1,
+        height: 1,
+        rgba: texel.to_vec(),
+    }];
+    // Thirty degrees off the normal.
+    let irradiance = vec3(3.0, 4.0, 5.0);
+    let cosine = std::f32::consts::FRAC_PI_6.cos();
+    scene.lights = vec![Light::Directional {
+        direction: -vec3(std::f32::consts::FRAC_PI_6.sin(), 0.0, cosine),
+        irradiance,
+        angular_radius: 0.0,
+    }];
+    let sunlit = irradiance * cosine / std::f32::consts::PI;
+    let mut renderer = StillRenderer::new(&scene).expect("a GPU");
+    assert_near(seen(&mut renderer, 0, 0.0), grey * sunlit, 0.02);
+    let [r, g, b, _] = texel.map(f32::from);
+    let color = vec3(r, g, b) / 255.0;
+    let linear = color.map(|c| ((c + 0.055) / 1.055).powf(2.4));
+    assert_near(seen(&mut renderer, 1, 0.0), linear * sunlit, 0.02);
+    assert_near(seen(&mut renderer, 2, 0.0), glow, 1e-3);
+}
