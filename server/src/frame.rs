@@ -12,7 +12,7 @@ use crate::{
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
-    light::{Light, Schedule},
+    light::{Job, Light, Schedule},
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
     scene::{Material, Scene},
@@ -24,6 +24,9 @@ use crate::{
 const LONGEST_HISTORY: f32 = 4096.0;
 /// The same where the head's motion changes what is seen in the surface.
 const GLOSSY_HISTORY: f32 = 8.0;
+/// Texels asked for per pixel and axis. More than one, because bilinear lookup
+/// blurs by about a texel and the outer half texels of a block lie beyond its patch.
+const TEXELS_PER_PIXEL: f32 = 1.12;
 /// Roughness above which a dielectric's highlight is as good as diffuse.
 const ROUGH: f32 = 0.5;
 
@@ -219,9 +222,15 @@ impl Pipeline {
         self.light.record_moves(&self.gpu, &mut encoder, &placed)?;
         self.gpu.queue.submit([encoder.finish()]);
         let eye = eye_of(&order.prediction);
+        let moved: Vec<Job> = (placed.placements.iter())
+            .map(|placed| {
+                self.schedule
+                    .job(&self.scene.patches, placed.patch, placed.block)
+            })
+            .collect();
         let noise = self
             .light
-            .trace(&self.gpu, &self.gpu_scene, &jobs, &placed.placements, eye)?;
+            .trace(&self.gpu, &self.gpu_scene, &jobs, &moved, eye)?;
         self.schedule.traced(&jobs, &noise);
         stages.light = lap();
 
@@ -262,7 +271,7 @@ impl Pipeline {
                 unplaced: placed.unplaced,
                 bias: placed.bias,
                 atlas: placed.stats,
-                paths: jobs.iter().map(crate::light::Job::paths).sum(),
+                paths: jobs.iter().map(Job::paths).sum(),
             },
         })
     }
@@ -275,7 +284,7 @@ impl Pipeline {
         poses: &[Pose],
     ) -> Vec<Request> {
         let eye = eye_of(prediction);
-        let pixels_per_radian = prediction.pixels_per_radian();
+        let pixels_per_radian = prediction.pixels_per_radian() * TEXELS_PER_PIXEL;
         visible
             .iter()
             .map(|visible| {

@@ -12,9 +12,10 @@ mod schedule;
 use std::collections::HashSet;
 
 use glam::Vec3;
-use shadecast_protocol::{Block, PatchId, Placement};
+use shadecast_protocol::{Block, PatchId};
 use shadecast_shaders::light::{
-    ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CarryParameters, LightParameters, Move, NO_BLOCK,
+    ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CELL_COUNT, CarryParameters, LightParameters, Move,
+    NO_BLOCK,
 };
 use wgpu::ShaderStages;
 
@@ -38,6 +39,8 @@ pub struct Light {
     radiance_before: Option<wgpu::Buffer>,
     surfaces: wgpu::Buffer,
     surfaces_before: Option<wgpu::Buffer>,
+    crisp: wgpu::Buffer,
+    crisp_before: Option<wgpu::Buffer>,
     parameters: wgpu::Buffer,
     blocks: wgpu::Buffer,
     noise: wgpu::Buffer,
@@ -47,6 +50,7 @@ pub struct Light {
     accumulate: wgpu::ComputePipeline,
     measure: wgpu::ComputePipeline,
     smooth: wgpu::ComputePipeline,
+    fade: wgpu::ComputePipeline,
     group: wgpu::BindGroup,
     carry: wgpu::ComputePipeline,
     carry_layout: wgpu::BindGroupLayout,
@@ -72,18 +76,31 @@ impl Light {
                 Binding::Write,
                 Binding::Write,
                 Binding::Write,
+                Binding::Write,
+                Binding::Write,
             ],
         );
         let radiance = gpu.scratch("radiance", texels * 16)?;
         let shown = gpu.scratch("shown", texels * 16)?;
         let surfaces = gpu.scratch("surfaces", texels * 16)?;
+        let crisp = gpu.scratch("crisp", texels * 16)?;
+        let cells = gpu.scratch("cells", u64::from(CELL_COUNT) * 16)?;
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
         let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
         let noise = gpu.scratch("noise", most_blocks * 4)?;
         let group = bind(
             gpu,
             &own_layout,
-            &[&parameters, &blocks, &radiance, &surfaces, &noise, &shown],
+            &[
+                &parameters,
+                &blocks,
+                &radiance,
+                &surfaces,
+                &noise,
+                &shown,
+                &crisp,
+                &cells,
+            ],
         );
         let paths = Paths::new(gpu, gpu_scene, texels as u32)?;
         let layouts = [&gpu_scene.layout, &paths.layout, &own_layout];
@@ -99,6 +116,8 @@ impl Light {
                 Binding::Read,
                 Binding::Write,
                 Binding::Write,
+                Binding::Read,
+                Binding::Write,
             ],
         );
         Ok(Self {
@@ -107,6 +126,7 @@ impl Light {
             accumulate: pipeline("accumulate"),
             measure: pipeline("measure_noise"),
             smooth: pipeline("smooth_blocks"),
+            fade: pipeline("fade_cells"),
             paths,
             carry: gpu.compute_pipeline(CARRY_SOURCE, "carry_blocks", &[&carry_layout], &[]),
             carry_layout,
@@ -117,6 +137,8 @@ impl Light {
             radiance_before: None,
             surfaces,
             surfaces_before: None,
+            crisp,
+            crisp_before: None,
             parameters,
             blocks,
             noise_readback: gpu.readback("noise", most_blocks * 4),
@@ -152,18 +174,25 @@ impl Light {
         moves.truncate((self.moves.size() / size_of::<Move>() as u64) as usize);
         let carries = moves.iter().any(|m| m.origin != NO_BLOCK);
         if carries && self.radiance_before.is_none() {
-            self.radiance_before = Some(gpu.scratch("radiance before", self.radiance.size())?);
-            self.surfaces_before = Some(gpu.scratch("surfaces before", self.surfaces.size())?);
+            let bytes = self.radiance.size();
+            self.radiance_before = Some(gpu.scratch("radiance before", bytes)?);
+            self.surfaces_before = Some(gpu.scratch("surfaces before", bytes)?);
+            self.crisp_before = Some(gpu.scratch("crisp before", bytes)?);
         }
-        if let (true, Some(radiance), Some(surfaces)) =
-            (carries, &self.radiance_before, &self.surfaces_before)
-        {
-            encoder.copy_buffer_to_buffer(&self.radiance, 0, radiance, 0, None);
-            encoder.copy_buffer_to_buffer(&self.surfaces, 0, surfaces, 0, None);
+        let copies = [
+            (&self.radiance, &self.radiance_before),
+            (&self.surfaces, &self.surfaces_before),
+            (&self.crisp, &self.crisp_before),
+        ];
+        for (from, to) in copies {
+            if let (true, Some(to)) = (carries, to) {
+                encoder.copy_buffer_to_buffer(from, 0, to, 0, None);
+            }
         }
         if placed.reset {
             encoder.clear_buffer(&self.radiance, 0, None);
             encoder.clear_buffer(&self.surfaces, 0, None);
+            encoder.clear_buffer(&self.crisp, 0, None);
             encoder.clear_buffer(&self.shown, 0, None);
         }
         if moves.is_empty() {
@@ -189,6 +218,8 @@ impl Light {
                 self.surfaces_before.as_ref().unwrap_or(&self.blocks),
                 &self.radiance,
                 &self.surfaces,
+                self.crisp_before.as_ref().unwrap_or(&self.blocks),
+                &self.crisp,
             ],
         );
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
@@ -199,8 +230,8 @@ impl Light {
         Ok(())
     }
 
-    /// Traces the paths of `jobs`, smooths what they and `placements` changed,
-    /// and tells how noisy each job's block still is.
+    /// Traces the paths of `jobs`, smooths what they and the moves changed, given
+    /// as jobs that are not traced, and tells how noisy each job's block still is.
     ///
     /// # Errors
     /// When the driver fails.
@@ -209,11 +240,11 @@ impl Light {
         gpu: &Gpu,
         gpu_scene: &GpuScene,
         jobs: &[Job],
-        placements: &[Placement],
+        moved: &[Job],
         eye: Vec3,
     ) -> Result<Vec<f32>, GpuError> {
         let most = (self.blocks.size() / size_of::<BlockRecord>() as u64) as usize;
-        let mut records = Vec::with_capacity(most.min(jobs.len() + placements.len()));
+        let mut records = Vec::with_capacity(most.min(jobs.len() + moved.len()));
         let mut path_count = 0;
         for job in jobs.iter().take(most) {
             records.push(job.record(path_count));
@@ -221,15 +252,14 @@ impl Light {
         }
         let lit = records.len();
         let lit_patches: HashSet<PatchId> = jobs.iter().map(Job::patch).collect();
-        let only_moved = placements
+        let only_moved = moved
             .iter()
-            .filter(|placement| !lit_patches.contains(&placement.patch));
-        records.extend(only_moved.take(most - lit).map(|placement| BlockRecord {
-            first_job: path_count,
-            position: position_bits(placement.block),
-            layout_bits: level_bits(placement.block),
-            ..Default::default()
-        }));
+            .filter(|job| !lit_patches.contains(&job.patch()));
+        records.extend(
+            only_moved
+                .take(most - lit)
+                .map(|job| job.record(path_count)),
+        );
         if records.is_empty() {
             return Ok(Vec::new());
         }
@@ -259,6 +289,8 @@ impl Light {
             pass.set_bind_group(0, &gpu_scene.group, &[]);
             pass.set_bind_group(1, &self.paths.group, &[]);
             pass.set_bind_group(2, &self.group, &[]);
+            pass.set_pipeline(&self.fade);
+            pass.dispatch_workgroups(CELL_COUNT * 4 / 64, 1, 1);
             pass.set_pipeline(&self.measure);
             pass.dispatch_workgroups((records.len() as u32).div_ceil(64), 1, 1);
             pass.set_pipeline(&self.smooth);

@@ -107,6 +107,22 @@ impl Schedule {
         }
     }
 
+    /// The job of lighting each texel of a patch's block once.
+    #[must_use]
+    pub fn job(&self, patches: &[Patch], id: PatchId, block: Block) -> Job {
+        let patch = &patches[id.0 as usize];
+        Job {
+            patch: id,
+            block,
+            shape: patch.shape,
+            first_triangle: patch.first_triangle,
+            instance: u32::from(patch.object.0),
+            sample_index: self.lit[id.0 as usize].drawn,
+            log2_stride: 0,
+            longest_history: self.longest_history[id.0 as usize],
+        }
+    }
+
     /// Jobs for about `budget` paths among the placed patches of the visible
     /// set, given with the pixels that each covers.
     #[must_use]
@@ -119,18 +135,8 @@ impl Schedule {
         let mut first_looks = Vec::new();
         let mut others: Vec<(f32, Job)> = Vec::new();
         for (id, block, pixels) in placed {
-            let patch = &patches[id.0 as usize];
             let lit = self.lit[id.0 as usize];
-            let job = Job {
-                patch: id,
-                block,
-                shape: patch.shape,
-                first_triangle: patch.first_triangle,
-                instance: u32::from(patch.object.0),
-                sample_index: lit.drawn,
-                log2_stride: 0,
-                longest_history: self.longest_history[id.0 as usize],
-            };
+            let job = self.job(patches, id, block);
             if lit.worth <= 0.0 {
                 first_looks.push(job);
                 continue;
@@ -192,7 +198,7 @@ impl Schedule {
         for (job, &noise) in jobs.iter().zip(noise) {
             let lit = &mut self.lit[job.patch.0 as usize];
             lit.drawn = lit.drawn.wrapping_add(1);
-            let weight = if job.log2_stride == 0 { 1.0 } else { 0.25 };
+            let weight = 0.25_f32.powi(job.log2_stride as i32);
             lit.worth = lit.worth.min(job.longest_history) + weight;
             lit.noise = if noise.is_finite() { noise } else { 0.0 };
         }

@@ -1,7 +1,8 @@
 // Begins paths at texels of placed patches, and accumulates what they bring.
 // One thread per job; jobs of a block are consecutive, `blocks` is ascending
 // in `first_job`. Reads the scene and `blocks`; updates `radiance` (mean and
-// weight) and `surfaces` (mean base colour, and of the squared luminance).
+// weight), `crisp` (the part of it that is free of noise) and `surfaces` (mean
+// base colour, and of the squared luminance of the rest).
 // Twin of the mapping: patch_point.rs. Source: SAS 2018, section 3.2; figure 6.
 
 struct LightParameters {
@@ -31,8 +32,8 @@ struct BlockRecord {
 @group(2) @binding(2) var<storage, read_write> radiance: array<vec4<f32>>;
 @group(2) @binding(3) var<storage, read_write> surfaces: array<vec4<f32>>;
 
-// Weight of a coarse first look that one path gave to several texels.
-const COARSE_WEIGHT: f32 = 0.25;
+@group(2) @binding(6) var<storage, read_write> crisp: array<vec4<f32>>;
+
 // Samples over which the mean runs where a moving object was met.
 const MOVING_HISTORY: f32 = 6.0;
 
@@ -152,6 +153,8 @@ fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     state.sample_index = job.block.sample_index;
     state.progress = 1u;
     state.albedo = surface.base;
+    state.crisp = surface.emissive;
+    state.cell = cell_around(surface.position, surface.ng, sample_2d(&rng) - 0.5);
     leave_vertex(path, surface, wo, 0u, 0u, state);
 }
 
@@ -163,12 +166,16 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     }
     let job = job_at(wave.first_job + path);
     let found = radiance_of(path);
-    let weight_of_sample = select(COARSE_WEIGHT, 1.0, job.stride == 1u);
+    // A coarse look is one sample, shared by the texels that it lights.
+    let weight_of_sample = 1.0 / f32(job.stride * job.stride);
+    let sharp = min(paths[path].crisp, found);
+    let rest = found - sharp;
+    add_to_cell(paths[path].cell, rest / max(paths[path].albedo, vec3<f32>(DARKEST)));
     var longest = job.block.longest_history;
     if ((paths[path].progress & NEAR_MOVER) != 0u) {
         longest = min(longest, MOVING_HISTORY);
     }
-    let square = luminance(found) * luminance(found);
+    let square = luminance(rest) * luminance(rest);
     for (var y = 0u; y < min(job.stride, job.size.y - job.corner.y); y++) {
         for (var x = 0u; x < min(job.stride, job.size.x - job.corner.x); x++) {
             let at = ((job.block.position >> 16u) + job.corner.y + y) * parameters.atlas_width
@@ -177,6 +184,7 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
             let history = min(old.w, longest);
             let share = weight_of_sample / (history + weight_of_sample);
             radiance[at] = vec4<f32>(mix(old.rgb, found, share), history + weight_of_sample);
+            crisp[at] = mix(crisp[at], vec4<f32>(sharp, 0.0), share);
             surfaces[at] = mix(surfaces[at], vec4<f32>(paths[path].albedo, square), share);
         }
     }

@@ -30,6 +30,9 @@ const CARRIED_WEIGHT: f32 = 12.0;
 @group(0) @binding(4) var<storage, read_write> radiance: array<vec4<f32>>;
 @group(0) @binding(5) var<storage, read_write> surfaces: array<vec4<f32>>;
 
+@group(0) @binding(6) var<storage, read> crisp_before: array<vec4<f32>>;
+@group(0) @binding(7) var<storage, read_write> crisp: array<vec4<f32>>;
+
 @compute @workgroup_size(64)
 fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32) {
@@ -45,6 +48,7 @@ fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         let at = ((m.to >> 16u) + p.y) * carry.atlas_width + (m.to & 0xffffu) + p.x;
         var content = vec4<f32>(0.0);
         var surface = vec4<f32>(0.0);
+        var sharp = vec4<f32>(0.0);
         if (m.origin != NO_BLOCK) {
             // Patch coordinates run over texel centres, at both levels.
             let q = vec2<f32>(p) * vec2<f32>(old_size - 1u) / vec2<f32>(size - 1u);
@@ -58,11 +62,14 @@ fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                 mix(before[r1 + low.x], before[r1 + high.x], f.x), f.y);
             surface = mix(mix(surfaces_before[r0 + low.x], surfaces_before[r0 + high.x], f.x),
                 mix(surfaces_before[r1 + low.x], surfaces_before[r1 + high.x], f.x), f.y);
+            sharp = mix(mix(crisp_before[r0 + low.x], crisp_before[r0 + high.x], f.x),
+                mix(crisp_before[r1 + low.x], crisp_before[r1 + high.x], f.x), f.y);
             if (any(old_size != size)) {
                 content.w = min(content.w, CARRIED_WEIGHT);
             }
         }
         radiance[at] = content;
         surfaces[at] = surface;
+        crisp[at] = sharp;
     }
 }

@@ -1,5 +1,5 @@
 // How noisy each block just lit still is, as it will be seen.
-// One thread per block; reads `radiance` and `surfaces`, writes `noise`: the
+// One thread per block; reads `radiance`, `crisp` and `surfaces`, writes `noise`: the
 // mean over the block of the standard error relative to the tone curve's scale.
 
 @group(2) @binding(4) var<storage, read_write> noise: array<f32>;
@@ -21,7 +21,8 @@ fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
         for (var x = 0u; x < size.x; x += step.x) {
             let at = ((block.position >> 16u) + y) * parameters.atlas_width + (block.position & 0xffffu) + x;
             let mean = luminance(radiance[at].rgb);
-            let variance = max(surfaces[at].w - mean * mean, 0.0) / max(radiance[at].w, 1.0);
+            let rest = mean - luminance(crisp[at].rgb);
+            let variance = max(surfaces[at].w - rest * rest, 0.0) / max(radiance[at].w, 1.0);
             sum += sqrt(variance) / (mean + 0.2);
             count += 1.0;
         }

@@ -24,6 +24,11 @@ struct PathState {
     cone: f32,
     // Of the first vertex.
     albedo: vec3<f32>,
+    // Where its light is shared with its surroundings.
+    cell: u32,
+    // What needs no smoothing: emission, and the sun at the first vertex.
+    crisp: vec3<f32>,
+    padding: u32,
 }
 
 @group(1) @binding(2) var<storage, read_write> paths: array<PathState>;
@@ -31,6 +36,8 @@ struct PathState {
 const SLOT_SUN: u32 = 0u;
 const SLOT_LIGHT: u32 = 1u;
 const SLOT_ONWARDS: u32 = 2u;
+// Dimension pairs that the start of a path draws.
+const PAIRS_AT_START: u32 = 2u;
 // Dimension pairs that one vertex may draw.
 const PAIRS_PER_VERTEX: u32 = 8u;
 
@@ -202,7 +209,7 @@ fn send_nothing(path: u32, slot: u32) {
 fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, state_in: PathState) {
     var state = state_in;
     let last = vertex >= globals.bounces;
-    var rng = Sampler(state.sample_index, state.seed, 1u + vertex * PAIRS_PER_VERTEX);
+    var rng = Sampler(state.sample_index, state.seed, PAIRS_AT_START + vertex * PAIRS_PER_VERTEX);
     let origin = offset_origin(s.position, s.ng);
 
     state.sun = vec3<f32>(0.0);
@@ -263,6 +270,9 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     var state = paths[path];
     if (HAS_SUN && is_unshadowed(path, SLOT_SUN, &state)) {
         state.radiance += state.sun;
+        if ((state.progress & 0xffffu) == 1u) {
+            state.crisp += state.sun;
+        }
     }
     if (is_unshadowed(path, SLOT_LIGHT, &state)) {
         state.radiance += state.light;

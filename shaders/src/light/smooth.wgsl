@@ -1,8 +1,11 @@
-// Smooths what few samples have lit, inside each block: the mean over a small
-// window of the radiance divided by the base colour, each neighbour counting by
-// its samples and by how likely the difference is noise. It fades out as
-// samples come in, so that a still scene converges to what was traced.
-// One workgroup per block; reads `radiance` and `surfaces`, writes `shown`.
+// Smooths what few samples have lit: the mean over a small window of the block
+// of the radiance divided by the base colour, each neighbour counting by its
+// samples and by how likely the difference is noise; and where even the window
+// holds few samples, the mean of the surroundings in the world. Both fade out as
+// samples come in, so that a still scene converges to what was traced. The sun
+// and emission are free of noise and are left as they are.
+// One workgroup per block; reads `radiance`, `crisp`, `surfaces` and `cells`,
+// writes `shown`.
 // Source: Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017,
 // sections 4.1 and 4.4, with one small window instead of a pyramid.
 
@@ -16,19 +19,38 @@ const ENOUGH_SAMPLES: f32 = 48.0;
 const TOLERANCE: f32 = 3.0;
 // Relative standard deviation assumed of one sample, while too few tell.
 const ASSUMED_NOISE: f32 = 0.8;
-// Base colour below which dividing by it would only amplify noise.
-const DARKEST: f32 = 0.02;
+// Samples that the surroundings count for.
+const CELL_WEIGHT: f32 = 6.0;
 
-// Radiance over base colour, and its variance.
+// Light over base colour, and its variance.
 fn demodulated(at: u32) -> vec4<f32> {
     let albedo = max(surfaces[at].rgb, vec3<f32>(DARKEST));
-    let r = radiance[at];
-    let mean = luminance(r.rgb);
+    let samples = radiance[at].w;
+    let rest = max(radiance[at].rgb - crisp[at].rgb, vec3<f32>(0.0));
+    let mean = luminance(rest);
     let measured = max(surfaces[at].w - mean * mean, 0.0);
     let assumed = ASSUMED_NOISE * ASSUMED_NOISE * mean * mean;
-    let of_one = mix(assumed, measured, clamp((r.w - 1.0) / 8.0, 0.0, 1.0));
+    let of_one = mix(assumed, measured, clamp((samples - 1.0) / 8.0, 0.0, 1.0));
     let scale = luminance(albedo);
-    return vec4<f32>(r.rgb / albedo, of_one / max(r.w, 0.25) / (scale * scale));
+    return vec4<f32>(rest / albedo, of_one / max(samples, 0.02) / (scale * scale));
+}
+
+// Light around a texel of a block, and how many paths it comes from.
+fn surroundings(block: BlockRecord, p: vec2<i32>, size: vec2<i32>) -> vec4<f32> {
+    let point = patch_point((block.layout_bits >> 8u) & 3u, vec2<f32>(p) / vec2<f32>(size - 1));
+    let triangle = block.first_triangle + point.triangle;
+    let p0 = vertex_position(triangle, 0u);
+    let e1 = vertex_position(triangle, 1u) - p0;
+    let e2 = vertex_position(triangle, 2u) - p0;
+    var position = p0 + e1 * point.b.x + e2 * point.b.y;
+    var n = normalize(cross(e1, e2));
+    let instance = block.layout_bits >> 16u;
+    if (HAS_MOVERS && instance != 0u) {
+        position = transform_point(instances[instance].world_from_object, position);
+        n = transform_vector(instances[instance].world_from_object, n);
+    }
+    n = select(-n, n, dot(n, parameters.eye - position) >= 0.0);
+    return cell_light(cell_around(position, n, vec2<f32>(0.0)));
 }
 
 @compute @workgroup_size(64)
@@ -66,8 +88,11 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                 weights += weight;
             }
         }
+        let around = surroundings(block, p, size);
+        let trust = CELL_WEIGHT * clamp(around.w / 16.0, 0.0, 1.0);
         let albedo = max(surfaces[at].rgb, vec3<f32>(DARKEST));
-        let smoothed = select(here.rgb, sum / weights * albedo, weights > 0.0);
+        let light = (sum + around.rgb * trust) / max(weights + trust, 1e-6);
+        let smoothed = crisp[at].rgb + light * albedo;
         shown[at] = vec4<f32>(mix(smoothed, here.rgb, here.w / ENOUGH_SAMPLES), here.w);
     }
 }
