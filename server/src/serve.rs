@@ -30,6 +30,8 @@ const PIXELS_PER_RADIAN: f32 = 1200.0;
 /// The same for a small atlas: half of what a software renderer's eyes have,
 /// because twice the triangles cost it more than a blurred floor at one's feet.
 const SMALL_PIXELS_PER_RADIAN: f32 = 88.0;
+/// Triangles that a software renderer may be given by subdivision whatever the scene had.
+const FEW_TRIANGLES: usize = 40_000;
 /// Height of a standing person's eyes above the play space's floor.
 const EYE_HEIGHT: f32 = 1.6;
 /// Clients that may be connected without having proved that they may.
@@ -62,7 +64,12 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
     } else {
         PIXELS_PER_RADIAN
     };
-    let patched = patches::cut(scene, PatchLimits::for_atlas(superblock, density));
+    let mut limits = PatchLimits::for_atlas(superblock, density);
+    if gpu.is_software {
+        // Sharp walls at one's nose are not worth drawing many times the scene.
+        limits.most_triangles = FEW_TRIANGLES.max(scene.triangles.len() * 2);
+    }
+    let patched = patches::cut(scene, limits);
     status.print(&patched.report.to_string());
     let spawn = patched
         .scene
