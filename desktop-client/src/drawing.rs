@@ -25,6 +25,7 @@ impl Drawing {
             eye_size,
             eye_format,
             stereo: gpu.stereo,
+            antialias: true,
         };
         Self {
             renderer: Renderer::new(&gpu.device, &gpu.queue, config),

@@ -118,8 +118,8 @@ pub struct Update {
     pub timing: UpdateTiming,
     /// The pose of the head that it was made for.
     pub world_from_head: Pose,
-    /// The scene's own time at `timing.started`, nanoseconds: where moving
-    /// objects are.
+    /// The scene's own time at `timing.started`, nanoseconds. Moving objects are
+    /// sent where they will be when the frame is seen.
     pub scene_time: u64,
     /// Vertices that are new to the client, by ascending id.
     pub vertices: Vec<Vertex>,

@@ -37,8 +37,10 @@ pub struct FrameOrder {
     pub frame: FrameId,
     /// Where the head may be while it is shown.
     pub prediction: Prediction,
-    /// Where moving objects are.
+    /// The scene's own time.
     pub scene_time: Duration,
+    /// The scene's time at which moving objects are shown: when the frame will be seen.
+    pub objects_time: Duration,
     /// Paths that may be traced.
     pub paths: u32,
     /// Begin a new epoch.
@@ -189,7 +191,7 @@ impl Pipeline {
             self.atlas.force_reset();
         }
         let poses: Vec<Pose> = (self.scene.scene.objects.iter())
-            .map(|object| object.world_from_object(order.scene_time))
+            .map(|object| object.world_from_object(order.objects_time))
             .collect();
         self.gpu_scene.set_poses(&self.gpu, &poses);
 

@@ -193,6 +193,8 @@ impl Session {
         let horizon = stream.latency.map_or(FIRST_HORIZON, |latency| {
             Duration::from_secs_f64(latency + stream.period).min(LONGEST_HORIZON)
         });
+        // Objects stand where they will be halfway through the frame's time on display.
+        let lead = horizon.saturating_sub(Duration::from_secs_f64(stream.period * 0.5));
         let paths = self.speed.map_or(FIRST_PATHS, |speed| {
             (speed * self.config.light_budget.as_secs_f64()).clamp(256.0, f64::from(1 << 26)) as u32
         });
@@ -202,6 +204,7 @@ impl Session {
             frame: stream.next_frame,
             prediction: Prediction::linear(&view, horizon, self.config.head_samples),
             scene_time: Duration::from_nanos(now.0),
+            objects_time: Duration::from_nanos(now.0) + lead,
             paths,
             reset: std::mem::take(&mut stream.reset),
             new_client: std::mem::take(&mut stream.new_client),

@@ -16,6 +16,7 @@ mod mesh;
 mod pipelines;
 mod readback;
 mod renderer;
+mod shrink;
 mod sky;
 #[cfg(test)]
 mod tests;

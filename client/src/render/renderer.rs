@@ -9,6 +9,7 @@ use crate::{ClientFrame, MaskAtlas, YuvPicture};
 use super::atlas::Atlas;
 use super::mesh::Mesh;
 use super::pipelines::{DEPTH_FORMAT, Needs, Pipelines};
+use super::shrink::Shrink;
 use super::sky::SkyPass;
 use super::{EyeCamera, EyeImages, Stereo};
 
@@ -21,6 +22,8 @@ pub struct RendererConfig {
     pub eye_format: wgpu::TextureFormat,
     /// How both are drawn.
     pub stereo: Stereo,
+    /// Draw four samples a pixel and show their mean.
+    pub antialias: bool,
 }
 
 /// Why a frame cannot be drawn on this device. The frame before it stays.
@@ -70,6 +73,7 @@ pub struct Renderer {
     objects: Option<wgpu::BindGroup>,
     sky: Option<SkyPass>,
     depth: wgpu::TextureView,
+    shrink: Option<Shrink>,
 }
 
 impl Renderer {
@@ -86,6 +90,9 @@ impl Renderer {
             objects: None,
             sky: None,
             depth: depth(device, config),
+            shrink: config
+                .antialias
+                .then(|| Shrink::new(device, config.eye_size, config.eye_format)),
         }
     }
 
@@ -130,6 +137,21 @@ impl Renderer {
     /// Draws the left and the right eye into the layers of `target`, which has
     /// the size and format of the configuration.
     pub fn draw(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        cameras: [EyeCamera; 2],
+        target: &EyeImages,
+    ) {
+        match &self.shrink {
+            Some(shrink) => {
+                self.draw_eyes(encoder, cameras, shrink.large());
+                shrink.draw(encoder, target);
+            }
+            None => self.draw_eyes(encoder, cameras, target),
+        }
+    }
+
+    fn draw_eyes(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         cameras: [EyeCamera; 2],
@@ -276,12 +298,13 @@ fn depth(device: &wgpu::Device, config: RendererConfig) -> wgpu::TextureView {
         Stereo::Multiview => 2,
         Stereo::TwoPass => 1,
     };
+    let scale = if config.antialias { 2 } else { 1 };
     device
         .create_texture(&wgpu::TextureDescriptor {
             label: Some("depth"),
             size: wgpu::Extent3d {
-                width: config.eye_size[0],
-                height: config.eye_size[1],
+                width: config.eye_size[0] * scale,
+                height: config.eye_size[1] * scale,
                 depth_or_array_layers: layers,
             },
             mip_level_count: 1,

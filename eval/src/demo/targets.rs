@@ -40,7 +40,7 @@ pub(super) fn of(summary: &Summary) -> Vec<Target> {
             summary.client_frames_per_second,
             "",
         ),
-        at_least("PSNR", 24.0, error.psnr_db, " dB"),
+        at_least("mean PSNR", 24.0, error.psnr_db, " dB"),
         Target {
             what: "mean FLIP",
             wanted: "<= 0.150".into(),

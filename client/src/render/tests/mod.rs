@@ -48,6 +48,7 @@ impl Bench {
             eye_size: [SIZE; 2],
             eye_format: FORMAT,
             stereo,
+            antialias: false,
         };
         let renderer = Renderer::new(&gpu.device, &gpu.queue, config);
         let eyes = EyeImages::new(&gpu.device, [SIZE; 2], FORMAT);

@@ -53,6 +53,7 @@ fn an_srgb_eye_shows_the_same_bytes() {
         eye_size: [SIZE; 2],
         eye_format: format,
         stereo: Stereo::TwoPass,
+        antialias: false,
     };
     let mut renderer = Renderer::new(&gpu.device, &gpu.queue, config);
     let eyes = EyeImages::new(&gpu.device, [SIZE; 2], format);

@@ -37,6 +37,7 @@ fn all_shaders_are_valid() {
     validated(TWO_PASS_SOURCE, immediates);
     validated(MULTIVIEW_SOURCE, immediates | Capabilities::MULTIVIEW);
     validated(include_str!("../yuv.wgsl"), Capabilities::empty());
+    validated(include_str!("../shrink.wgsl"), Capabilities::empty());
     validated(include_str!("../lens.wgsl"), immediates);
 }
 

@@ -1,0 +1,90 @@
+//! Antialiasing by drawing the eyes twice as wide and high and taking means.
+//!
+//! Multisampling would be cheaper, but software drivers get its resolve into
+//! layers and its centroids wrong, and then atlas lookups leave their blocks.
+
+use super::EyeImages;
+
+/// Pictures twice as large as the eyes, and the pass that shrinks them.
+#[derive(Debug)]
+pub(super) struct Shrink {
+    large: EyeImages,
+    groups: [wgpu::BindGroup; 2],
+    pipeline: wgpu::RenderPipeline,
+}
+
+impl Shrink {
+    /// For eyes of `eye_size` pixels.
+    pub(super) fn new(
+        device: &wgpu::Device,
+        eye_size: [u32; 2],
+        format: wgpu::TextureFormat,
+    ) -> Self {
+        let large = EyeImages::new(device, eye_size.map(|side| side * 2), format);
+        let module = device.create_shader_module(wgpu::include_wgsl!("shrink.wgsl"));
+        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
+            label: Some("shrink"),
+            layout: None,
+            vertex: wgpu::VertexState {
+                module: &module,
+                entry_point: Some("cover"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                buffers: &[],
+            },
+            fragment: Some(wgpu::FragmentState {
+                module: &module,
+                entry_point: Some("shrink"),
+                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                targets: &[Some(format.into())],
+            }),
+            primitive: wgpu::PrimitiveState::default(),
+            depth_stencil: None,
+            multisample: wgpu::MultisampleState::default(),
+            multiview_mask: None,
+            cache: None,
+        });
+        let layout = pipeline.get_bind_group_layout(0);
+        let groups = large.layers().each_ref().map(|layer| {
+            device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("shrink"),
+                layout: &layout,
+                entries: &[wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(layer),
+                }],
+            })
+        });
+        Self {
+            large,
+            groups,
+            pipeline,
+        }
+    }
+
+    /// What to draw the eyes into.
+    pub(super) fn large(&self) -> &EyeImages {
+        &self.large
+    }
+
+    /// Shrinks both eyes into `target`.
+    pub(super) fn draw(&self, encoder: &mut wgpu::CommandEncoder, target: &EyeImages) {
+        for (group, view) in self.groups.iter().zip(target.layers()) {
+            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+                label: Some("shrink"),
+                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+                    view,
+                    depth_slice: None,
+                    resolve_target: None,
+                    ops: wgpu::Operations {
+                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                        store: wgpu::StoreOp::Store,
+                    },
+                })],
+                ..wgpu::RenderPassDescriptor::default()
+            });
+            pass.set_pipeline(&self.pipeline);
+            pass.set_bind_group(0, group, &[]);
+            pass.draw(0..3, 0..1);
+        }
+    }
+}
