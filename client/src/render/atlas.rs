@@ -3,6 +3,7 @@
 
 use std::sync::Arc;
 
+use super::cover::cover_pipeline;
 use super::pipelines::Layouts;
 use crate::{ClientFrame, MaskAtlas, YuvPicture};
 
@@ -43,27 +44,7 @@ struct Mask {
 impl Atlas {
     pub(super) fn new(device: &wgpu::Device, eye_format: wgpu::TextureFormat) -> Self {
         let module = device.create_shader_module(wgpu::include_wgsl!("yuv.wgsl"));
-        let convert = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("RGB from YUV"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("cover"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
-            },
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("rgb_from_yuv"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(PLAIN.into())],
-            }),
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            multiview_mask: None,
-            cache: None,
-        });
+        let convert = cover_pipeline(device, &module, "rgb_from_yuv", None, PLAIN);
         Self {
             convert,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {

@@ -3,7 +3,7 @@
 //! Multisampling would be cheaper, but software drivers get its resolve into
 //! layers and its centroids wrong, and then atlas lookups leave their blocks.
 
-use super::EyeImages;
+use super::{EyeImages, cover::cover_pipeline};
 
 /// Pictures twice as large as the eyes, and the pass that shrinks them.
 #[derive(Debug)]
@@ -22,27 +22,7 @@ impl Shrink {
     ) -> Self {
         let large = EyeImages::new(device, eye_size.map(|side| side * 2), format);
         let module = device.create_shader_module(wgpu::include_wgsl!("shrink.wgsl"));
-        let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
-            label: Some("shrink"),
-            layout: None,
-            vertex: wgpu::VertexState {
-                module: &module,
-                entry_point: Some("cover"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                buffers: &[],
-            },
-            fragment: Some(wgpu::FragmentState {
-                module: &module,
-                entry_point: Some("shrink"),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(format.into())],
-            }),
-            primitive: wgpu::PrimitiveState::default(),
-            depth_stencil: None,
-            multisample: wgpu::MultisampleState::default(),
-            multiview_mask: None,
-            cache: None,
-        });
+        let pipeline = cover_pipeline(device, &module, "shrink", None, format);
         let layout = pipeline.get_bind_group_layout(0);
         let groups = large.layers().each_ref().map(|layer| {
             device.create_bind_group(&wgpu::BindGroupDescriptor {
