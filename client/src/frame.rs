@@ -77,6 +77,8 @@ pub struct ClientFrame {
     pub vertices: Arc<Vec<DrawVertex>>,
     /// Counter-clockwise triangles; double-sided ones appear in both windings.
     pub indices: Arc<Vec<u32>>,
+    /// How many of the indices, from the first on, need no mask.
+    pub opaque_indices: u32,
     /// `world_from_object` of every object; index 0 is the identity.
     pub transforms: Arc<Vec<Pose>>,
     /// The shading.

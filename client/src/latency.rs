@@ -180,6 +180,7 @@ mod tests {
             },
             vertices: Arc::default(),
             indices: Arc::default(),
+            opaque_indices: 0,
             transforms: Arc::default(),
             picture: Arc::new(YuvPicture {
                 width: 0,

@@ -63,6 +63,7 @@ struct Placed {
 struct Geometry {
     vertices: Arc<Vec<DrawVertex>>,
     indices: Arc<Vec<u32>>,
+    opaque_indices: u32,
 }
 
 /// The masks of all placed patches as one picture.
@@ -132,14 +133,11 @@ impl World {
         picture: Arc<YuvPicture>,
         timing: ClientTiming,
     ) -> ClientFrame {
-        let Geometry { vertices, indices } = self
+        let geometry = self
             .geometry
             .take()
             .unwrap_or_else(|| self.build_geometry());
-        self.geometry = Some(Geometry {
-            vertices: Arc::clone(&vertices),
-            indices: Arc::clone(&indices),
-        });
+        self.geometry = Some(geometry.clone());
         ClientFrame {
             frame: update.frame,
             epoch: update.epoch,
@@ -147,8 +145,9 @@ impl World {
             scene_time: update.scene_time,
             server_timing: update.timing,
             timing,
-            vertices,
-            indices,
+            vertices: geometry.vertices,
+            indices: geometry.indices,
+            opaque_indices: geometry.opaque_indices,
             transforms: Arc::clone(&self.transforms),
             picture,
             masks: self.masks(),
@@ -234,13 +233,25 @@ impl World {
         }
     }
 
-    /// One vertex per corner of a placed patch, by ascending patch.
+    /// One vertex per corner of a placed patch: those without a mask first, each
+    /// kind by ascending patch.
     fn build_geometry(&self) -> Geometry {
         // Most patches are pairs: four corners and two triangles.
         let mut vertices = Vec::with_capacity(self.placed.len() * 4);
         let mut indices = Vec::with_capacity(self.placed.len() * 6);
-        for (id, Placed { block, .. }) in &self.placed {
-            let Some(patch) = self.patches.get(id) else {
+        self.build_patches(false, &mut vertices, &mut indices);
+        let opaque_indices = indices.len() as u32;
+        self.build_patches(true, &mut vertices, &mut indices);
+        Geometry {
+            vertices: Arc::new(vertices),
+            indices: Arc::new(indices),
+            opaque_indices,
+        }
+    }
+
+    fn build_patches(&self, masked: bool, vertices: &mut Vec<DrawVertex>, indices: &mut Vec<u32>) {
+        for (id, Placed { block, mask }) in &self.placed {
+            let Some(patch) = self.patches.get(id).filter(|_| mask.is_some() == masked) else {
                 continue;
             };
             let first = vertices.len() as u32;
@@ -248,10 +259,11 @@ impl World {
             let span = [(width - 1) as f32, (height - 1) as f32];
             let origin = [f32::from(block.x) + 0.5, f32::from(block.y) + 0.5];
             for (uv, &slot) in patch.shape.corners().iter().zip(&patch.corners) {
+                let [x, y] = block.level.turn(*uv);
                 vertices.push(DrawVertex {
                     position: self.positions[slot as usize].to_array(),
                     object: u32::from(patch.object.0),
-                    texel: [origin[0] + uv[0] * span[0], origin[1] + uv[1] * span[1]],
+                    texel: [origin[0] + x * span[0], origin[1] + y * span[1]],
                 });
             }
             for triangle in patch.shape.triangles() {
@@ -261,10 +273,6 @@ impl World {
                     indices.extend([a, c, b]);
                 }
             }
-        }
-        Geometry {
-            vertices: Arc::new(vertices),
-            indices: Arc::new(indices),
         }
     }
 

@@ -4,8 +4,8 @@
 use glam::Vec3;
 
 use crate::{
-    Block, ClockReply, Hello, MIN_LOG2_SIDE, ObjectId, PatchGeometry, PatchId, Picture, Placement,
-    Pose, Update, VertexId, ViewReport, Welcome, WireError,
+    Block, ClockReply, Hello, Level, MIN_LOG2_SIDE, ObjectId, PatchGeometry, PatchId, Picture,
+    Placement, Pose, Update, VertexId, ViewReport, Welcome, WireError,
     wire::{MAX_MESSAGE_BYTES, MAX_PATCHES, MAX_VERTICES, within},
 };
 
@@ -183,9 +183,10 @@ impl Rules {
     }
 
     fn block(&self, block: Block) -> Result<(), WireError> {
-        let (width, height) = (block.level.width, block.level.height);
-        let landscape = MIN_LOG2_SIDE <= height && height <= width && width <= MAX_LOG2_SIDE;
-        self.demand(landscape, "block size")?;
+        let sides = MIN_LOG2_SIDE..=MAX_LOG2_SIDE;
+        let in_range = |side| sides.contains(&side);
+        let Level { width, height } = block.level;
+        self.demand(in_range(width) && in_range(height), "block size")?;
         let (width, height) = block.level.size();
         let (x, y) = (u32::from(block.x), u32::from(block.y));
         let inside = x + width <= MAX_SIDE.into() && y + height <= MAX_SIDE.into();

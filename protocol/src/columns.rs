@@ -102,7 +102,7 @@ struct Columns {
     removals: Vec<u32>,
     /// Gaps between ids.
     placements: Vec<u32>,
-    /// log2 of the width in the high four bits, of the height in the low four.
+    /// log2 of the texels along the patch's u in the high four bits, along v in the low four.
     levels: Vec<u8>,
     /// Half the difference of x to the block before of the same level.
     x: Vec<i16>,

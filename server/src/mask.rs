@@ -17,11 +17,13 @@ pub(crate) fn block_mask(scene: &Scene, patch: &Patch, placement: Placement) -> 
         PatchShape::Pair => 1,
         PatchShape::Triple => 2,
     };
-    let (width, height) = placement.block.level.size();
+    let level = placement.block.level;
+    let (width, height) = level.size();
     let mut bits = vec![0; ((width * height) as usize).div_ceil(8)];
     for y in 0..height {
         for x in 0..width {
-            let point = patch_point(shape, texel_coordinates(x, y, width, height));
+            let [u, v] = level.turn(texel_coordinates(x, y, width, height).to_array());
+            let point = patch_point(shape, Vec2::new(u, v));
             let index = (y * width + x) as usize;
             if is_there(
                 scene,

@@ -44,7 +44,7 @@ struct Mask {
 impl Atlas {
     pub(super) fn new(device: &wgpu::Device, eye_format: wgpu::TextureFormat) -> Self {
         let module = device.create_shader_module(wgpu::include_wgsl!("yuv.wgsl"));
-        let convert = cover_pipeline(device, &module, "rgb_from_yuv", None, PLAIN);
+        let convert = cover_pipeline(device, &module, "rgb_from_yuv", None, &[], PLAIN);
         Self {
             convert,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {

@@ -248,5 +248,5 @@ fn pipeline(
         bind_group_layouts: &[Some(layout)],
         immediate_size: size_of::<LensImmediates>() as u32,
     });
-    cover_pipeline(device, &module, "prewarp", Some(&layout), format)
+    cover_pipeline(device, &module, "prewarp", Some(&layout), &[], format)
 }

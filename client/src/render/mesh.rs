@@ -1,6 +1,6 @@
 //! Vertices, indices and transforms on the GPU, in buffers that grow and stay.
 
-use std::sync::Arc;
+use std::{ops::Range, sync::Arc};
 
 use glam::Mat4;
 
@@ -11,6 +11,8 @@ use crate::{ClientFrame, DrawVertex};
 pub(super) struct Mesh {
     vertices: Uploaded<DrawVertex>,
     indices: Uploaded<u32>,
+    /// How many of the indices, from the first on, need no mask.
+    opaque_indices: u32,
     transforms: GrowingBuffer,
     objects: usize,
 }
@@ -20,6 +22,7 @@ impl Mesh {
         Self {
             vertices: Uploaded::new("vertices", wgpu::BufferUsages::VERTEX),
             indices: Uploaded::new("indices", wgpu::BufferUsages::INDEX),
+            opaque_indices: 0,
             transforms: GrowingBuffer::new("transforms", wgpu::BufferUsages::STORAGE),
             objects: 0,
         }
@@ -47,6 +50,7 @@ impl Mesh {
     ) -> bool {
         self.vertices.upload(device, queue, &frame.vertices);
         self.indices.upload(device, queue, &frame.indices);
+        self.opaque_indices = frame.opaque_indices.min(self.indices.count());
         self.objects = frame.transforms.len();
         if !self.moves() {
             return false;
@@ -65,8 +69,17 @@ impl Mesh {
         self.transforms.buffer.as_ref()
     }
 
-    /// One draw call over everything.
-    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>) {
+    /// The indices of triangles with or without a mask.
+    pub(super) fn range(&self, masked: bool) -> Range<u32> {
+        if masked {
+            self.opaque_indices..self.indices.count()
+        } else {
+            0..self.opaque_indices
+        }
+    }
+
+    /// One draw call.
+    pub(super) fn draw(&self, pass: &mut wgpu::RenderPass<'_>, range: Range<u32>) {
         let (Some(vertices), Some(indices)) =
             (&self.vertices.buffer.buffer, &self.indices.buffer.buffer)
         else {
@@ -74,7 +87,7 @@ impl Mesh {
         };
         pass.set_vertex_buffer(0, vertices.slice(..));
         pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
-        pass.draw_indexed(0..self.indices.count(), 0, 0..1);
+        pass.draw_indexed(range, 0, 0..1);
     }
 }
 

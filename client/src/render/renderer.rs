@@ -130,7 +130,9 @@ impl Renderer {
                 })
             });
         }
-        self.pipelines.prepare(device, self.needs());
+        for needs in self.needs() {
+            self.pipelines.prepare(device, needs);
+        }
         Ok(())
     }
 
@@ -203,29 +205,37 @@ impl Renderer {
         }
     }
 
+    /// What has no mask first, so that the GPU can test depth before it shades.
     fn draw_patches(&self, pass: &mut wgpu::RenderPass<'_>, clip_from_world: [Mat4; 2]) {
-        let needs = self.needs();
-        let (Some(pipeline), Some(atlas)) = (self.pipelines.patches(needs), self.atlas.group())
-        else {
+        let Some(atlas) = self.atlas.group() else {
             return;
         };
-        pass.set_pipeline(pipeline);
-        pass.set_immediates(0, bytemuck::bytes_of(&clip_from_world));
-        pass.set_bind_group(0, atlas, &[]);
-        if needs.objects {
-            pass.set_bind_group(1, self.objects.as_ref(), &[]);
+        for needs in self.needs() {
+            let Some(pipeline) = self.pipelines.patches(needs) else {
+                continue;
+            };
+            pass.set_pipeline(pipeline);
+            pass.set_immediates(0, bytemuck::bytes_of(&clip_from_world));
+            pass.set_bind_group(0, atlas, &[]);
+            if needs.objects {
+                pass.set_bind_group(1, self.objects.as_ref(), &[]);
+            }
+            if needs.mask {
+                pass.set_bind_group(2, self.atlas.mask_group(), &[]);
+            }
+            self.mesh.draw(pass, self.mesh.range(needs.mask));
         }
-        if needs.mask {
-            pass.set_bind_group(2, self.atlas.mask_group(), &[]);
-        }
-        self.mesh.draw(pass);
     }
 
-    fn needs(&self) -> Needs {
-        Needs {
-            objects: self.mesh.moves(),
-            mask: self.atlas.mask_group().is_some(),
-        }
+    /// Of the draw calls that the frame takes: at most two.
+    fn needs(&self) -> impl Iterator<Item = Needs> + use<> {
+        let objects = self.mesh.moves();
+        let has_masks = self.atlas.mask_group().is_some();
+        let needed = [false, true].map(|mask| {
+            let drawn = !self.mesh.range(mask).is_empty() && (has_masks || !mask);
+            drawn.then_some(Needs { objects, mask })
+        });
+        needed.into_iter().flatten()
     }
 
     /// The atlas as it was decoded, RGBA8, to be read back; none before the

@@ -22,7 +22,14 @@ impl Shrink {
     ) -> Self {
         let large = EyeImages::new(device, eye_size.map(|side| side * 2), format);
         let module = device.create_shader_module(wgpu::include_wgsl!("shrink.wgsl"));
-        let pipeline = cover_pipeline(device, &module, "shrink", None, format);
+        let pipeline = cover_pipeline(
+            device,
+            &module,
+            "shrink",
+            None,
+            &[("IS_ENCODED", f64::from(!format.is_srgb()))],
+            format,
+        );
         let layout = pipeline.get_bind_group_layout(0);
         let groups = large.layers().each_ref().map(|layer| {
             device.create_bind_group(&wgpu::BindGroupDescriptor {

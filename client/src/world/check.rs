@@ -188,6 +188,6 @@ fn lies_in(block: Block, atlas_size: [u16; 2]) -> bool {
         let end = length.and_then(|length| length.checked_add(u32::from(start)));
         end.is_some_and(|end| end <= u32::from(side))
     };
-    lies_on(block.x, block.level.width, atlas_size[0])
-        && lies_on(block.y, block.level.height, atlas_size[1])
+    let level = block.level.landscape();
+    lies_on(block.x, level.width, atlas_size[0]) && lies_on(block.y, level.height, atlas_size[1])
 }

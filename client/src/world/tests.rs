@@ -115,6 +115,7 @@ fn corners_lie_on_texel_centres_of_their_block() {
         [16.5, 47.5],
     ];
     assert_eq!(texels, expected);
+    assert_eq!(frame.opaque_indices as usize, frame.indices.len());
     let indices = [
         0, 1, 2, // solo
         3, 4, 6, 4, 5, 6, // pair
@@ -123,6 +124,22 @@ fn corners_lie_on_texel_centres_of_their_block() {
     assert_eq!(*frame.indices, indices);
     assert_eq!(frame.patches, 3);
     assert_eq!(frame.vertices[3].position, [20.0, 0.5, -1.0]);
+}
+
+#[test]
+fn an_upright_patch_lies_on_its_side() {
+    let mut world = world();
+    let update = Update {
+        placements: vec![placement(2, 8, 16, [1, 3])],
+        ..update(1)
+    };
+    world.apply(&update).unwrap();
+    let frame = frame(&mut world);
+    let texels: Vec<_> = frame.vertices[3..7].iter().map(|v| v.texel).collect();
+    assert_eq!(
+        texels,
+        [[8.5, 16.5], [8.5, 17.5], [15.5, 17.5], [15.5, 16.5]]
+    );
 }
 
 #[test]

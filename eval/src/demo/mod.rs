@@ -58,7 +58,7 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u32,
     /// Seconds that all references together may take.
-    #[arg(long, value_name = "N", default_value_t = 50)]
+    #[arg(long, value_name = "N", default_value_t = 45)]
     pub reference_seconds: u32,
     /// Compares whole pictures instead of a window of each, however long that takes.
     #[arg(long, conflicts_with = "reference_seconds")]

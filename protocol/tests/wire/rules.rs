@@ -187,16 +187,21 @@ fn corners_are_vertices_and_spare_ones_repeat() {
 }
 
 #[test]
-fn blocks_are_landscape_and_inside_the_largest_atlas() {
+fn blocks_are_inside_the_largest_atlas() {
     let block =
         |position, level| bad_update(|u| u.placements[0] = samples::placement(0, position, level));
     assert_eq!(block([0, 0], [1, 0]), "block size");
-    assert_eq!(block([0, 0], [2, 3]), "block size");
     assert_eq!(block([0, 0], [14, 2]), "block size");
+    assert_eq!(block([0, 0], [2, 14]), "block size");
     assert_eq!(block([0, 0], [255, 255]), "block size");
     assert_eq!(block([1, 0], [2, 2]), "block position");
     assert_eq!(block([0, 3], [2, 2]), "block position");
     assert_eq!(block([8190, 0], [2, 2]), "block position");
+    assert_eq!(
+        block([8188, 0], [2, 3]),
+        "block position",
+        "lies on its side"
+    );
     assert_eq!(block([0, 65534], [2, 2]), "block position");
 }
 

@@ -8,7 +8,11 @@
 
 use shadecast_protocol::{Level, MIN_LOG2_SIDE, PatchId};
 
-use super::{Atlas, Request, bias, level::steady_level, superblocks::Counts};
+use super::{
+    Atlas, Request, bias,
+    level::steady_level,
+    superblocks::{Counts, count_of},
+};
 
 /// Bias is added in steps of this: an eighth of an octave of area is a small
 /// part of what [`HYSTERESIS`](super::HYSTERESIS) swallows.
@@ -112,7 +116,7 @@ impl Atlas {
         for &Request { patch, ideal, .. } in requests {
             let current = self.block_of(patch).map(|block| block.level);
             let level = steady_level(current, ideal, self.bias, largest);
-            counts[usize::from(level.width)][usize::from(level.height)] += 1;
+            *count_of(&mut counts, level) += 1;
             chosen.push(Chosen { patch, level });
         }
         counts

@@ -130,10 +130,10 @@ impl Wish {
     fn new(ideal: IdealSize, bias: f32, largest: u8) -> Self {
         let (least, most) = (2.0 * f32::from(MIN_LOG2_SIDE), 2.0 * f32::from(largest));
         let area = (ideal.log2_area.min(most) - bias).max(least).min(most);
-        let aspect = ideal.log2_aspect.max(0.0);
+        let widest = (area - least).min(most - area);
         Self {
             area,
-            aspect: aspect.min(area - least).min(most - area),
+            aspect: ideal.log2_aspect.max(-widest).min(widest),
         }
     }
 
@@ -141,9 +141,10 @@ impl Wish {
     fn rounded(&self, largest: u8) -> Level {
         let area = self.area.round() as i32;
         let parity = area & 1;
-        let aspect = 2 * ((self.aspect - parity as f32) * 0.5).round() as i32 + parity;
+        let aspect = 2 * ((self.aspect.abs() - parity as f32) * 0.5).round() as i32 + parity;
         let (least, most) = (2 * i32::from(MIN_LOG2_SIDE), 2 * i32::from(largest));
         let aspect = aspect.min(area - least).min(most - area).max(parity);
+        let aspect = if self.aspect < 0.0 { -aspect } else { aspect };
         Level {
             width: ((area + aspect) / 2) as u8,
             height: ((area - aspect) / 2) as u8,
@@ -256,7 +257,8 @@ mod tests {
             "odd areas cannot be square"
         );
         assert_eq!(level(ideal(7.0, 2.6), 0.0, 6), at(5, 2));
-        assert_eq!(level(ideal(8.0, -3.0), 0.0, 6), at(4, 4), "landscape");
+        assert_eq!(level(ideal(8.0, -2.0), 0.0, 6), at(3, 5), "on its side");
+        assert_eq!(level(ideal(7.0, -0.1), 0.0, 6), at(3, 4));
         assert_eq!(level(ideal(8.0, 16.0), 0.0, 6), at(6, 2));
         assert_eq!(level(ideal(4.0, 16.0), 0.0, 6), at(3, 1));
         assert_eq!(level(ideal(32.0, 0.0), 0.0, 6), at(6, 6));
@@ -287,18 +289,19 @@ mod tests {
                 prop_assert!((0.0..=32.0).contains(&size.log2_area));
                 prop_assert!((-16.0..=16.0).contains(&size.log2_aspect));
                 let level = level(size, bias, largest);
-                prop_assert!(MIN_LOG2_SIDE <= level.height && level.height <= level.width);
-                prop_assert!(level.width <= largest);
+                let sides = MIN_LOG2_SIDE..=largest;
+                prop_assert!(sides.contains(&level.width) && sides.contains(&level.height));
             }
         }
 
         #[test]
-        fn a_level_is_near_its_wish(area in 2.0_f32..12.0, aspect in 0.0_f32..8.0) {
+        fn a_level_is_near_its_wish(area in 2.0_f32..12.0, aspect in -8.0_f32..8.0) {
             let found = level(ideal(area, aspect), 0.0, 6);
             let found_area = f32::from(found.width + found.height);
             prop_assert!((found_area - area).abs() <= 0.5);
-            let found_aspect = f32::from(found.width - found.height);
-            let possible = aspect.min(area - 2.0).min(12.0 - area);
+            let found_aspect = f32::from(found.width) - f32::from(found.height);
+            let widest = (area - 2.0).min(12.0 - area);
+            let possible = aspect.clamp(-widest, widest);
             prop_assert!((found_aspect - possible).abs() <= 1.5);
         }
     }

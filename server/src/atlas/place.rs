@@ -5,7 +5,7 @@ use shadecast_protocol::{Block, Epoch, Level, MIN_LOG2_SIDE, PatchId, Placement}
 use super::{
     AtlasError, AtlasStats, Placed, Request,
     choice::Chosen,
-    superblocks::{Counts, Provision, Superblocks},
+    superblocks::{Counts, Provision, Superblocks, count_of},
 };
 
 /// Share of the superblocks that the visible set may need in an empty atlas.
@@ -280,7 +280,7 @@ fn request_all(chosen: &[Chosen]) -> (Vec<Wanted>, Counts) {
 impl Wanted {
     fn draw(chosen: &Chosen, counts: &mut Counts) -> Self {
         let Chosen { patch, level } = *chosen;
-        let count = &mut counts[usize::from(level.width)][usize::from(level.height)];
+        let count = count_of(counts, level);
         let slot = *count;
         *count += 1;
         Self { patch, level, slot }

@@ -16,8 +16,14 @@ use shadecast_protocol::{Block, Level, MIN_LOG2_SIDE};
 /// log2 of a side is below this: sides are 16 bits.
 const SIDES: usize = 16;
 
-/// A number of blocks for each level, `[log2 width][log2 height]`.
+/// A number of blocks for each level, `[log2 width][log2 height]` of the block.
 pub(super) type Counts = [[u32; SIDES]; SIDES];
+
+/// Where `level` is counted.
+pub(super) fn count_of(counts: &mut Counts, level: Level) -> &mut u32 {
+    let Level { width, height } = level.landscape();
+    &mut counts[usize::from(width)][usize::from(height)]
+}
 
 /// All memory that no block occupies.
 #[derive(Clone, Debug)]
@@ -120,7 +126,7 @@ impl Superblocks {
 
     /// Takes one block back (request phase).
     pub(super) fn release(&mut self, block: Block) {
-        self.stack(block.level).push([block.x, block.y]);
+        self.stack(block.level.landscape()).push([block.x, block.y]);
     }
 
     fn stack(&mut self, level: Level) -> &mut Vec<[u16; 2]> {
@@ -213,14 +219,15 @@ impl Superblocks {
     /// The assignment phase for one request: the block of the `slot`th request
     /// of a level, each slot once, in ascending order.
     pub(super) fn assign(&mut self, provision: &Provision, level: Level, slot: u32) -> Block {
-        let columns = &provision.widths[usize::from(level.width)];
-        let height = usize::from(level.height);
-        if slot < columns.required[height] {
-            let start = (columns.offset[height] + u64::from(slot)) << level.height;
+        let Level { width, height } = level.landscape();
+        let columns = &provision.widths[usize::from(width)];
+        let required = columns.required[usize::from(height)];
+        if slot < required {
+            let start = (columns.offset[usize::from(height)] + u64::from(slot)) << height;
             return self.block_at(&columns.superblocks, start, level);
         }
         let [x, y] = self
-            .stack(level)
+            .stack(level.landscape())
             .pop()
             .expect("provisioning counted a block on the stack for every other request");
         Block { x, y, level }
@@ -228,11 +235,12 @@ impl Superblocks {
 
     /// The block that begins `start` texels of column length into `superblocks`.
     fn block_at(&self, superblocks: &[u32], start: u64, level: Level) -> Block {
-        let capacity = self.capacity(level.width);
+        let Level { width, .. } = level.landscape();
+        let capacity = self.capacity(width);
         let superblock = superblocks[(start / capacity) as usize];
         let inside = (start % capacity) as u32;
         let column = inside >> self.log2_side;
-        let x = ((superblock % self.per_row) << self.log2_side) + (column << level.width);
+        let x = ((superblock % self.per_row) << self.log2_side) + (column << width);
         let y = ((superblock / self.per_row) << self.log2_side)
             + (inside & ((1 << self.log2_side) - 1));
         Block {

@@ -8,6 +8,8 @@
 
 mod paths;
 mod schedule;
+#[cfg(test)]
+mod tests;
 
 use std::collections::HashSet;
 
@@ -314,13 +316,15 @@ fn position_bits(block: Block) -> u32 {
 }
 
 fn level_bits(block: Block) -> u32 {
-    u32::from(block.level.width) | u32::from(block.level.height) << 4
+    let level = block.level.landscape();
+    u32::from(level.width) | u32::from(level.height) << 4
 }
 
 fn move_record(new: Block, old: Option<Block>) -> Move {
+    let turns = old.is_some_and(|old| old.level.is_turned() != new.level.is_turned());
     Move {
         to: position_bits(new),
-        levels: level_bits(new) | old.map_or(0, level_bits) << 8,
+        levels: level_bits(new) | old.map_or(0, level_bits) << 8 | u32::from(turns) << 16,
         origin: old.map_or(NO_BLOCK, position_bits),
         padding: 0,
     }

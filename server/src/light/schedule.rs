@@ -54,10 +54,10 @@ impl Job {
         BlockRecord {
             first_job,
             position: u32::from(self.block.x) | u32::from(self.block.y) << 16,
-            layout_bits: u32::from(self.block.level.width)
-                | u32::from(self.block.level.height) << 4
+            layout_bits: super::level_bits(self.block)
                 | shape << 8
                 | self.log2_stride << 10
+                | u32::from(self.block.level.is_turned()) << 14
                 | self.instance << 16,
             first_triangle: self.first_triangle,
             sample_index: self.sample_index,

@@ -4,15 +4,11 @@
 use glam::Vec3;
 use shadecast_protocol::PatchShape;
 
-use super::{DrawRange, Kind, Patch, grouping::Group, turn::turned};
+use super::{DrawRange, Kind, Patch, grouping::Group};
 use crate::scene::{Scene, Triangle};
 
-/// Reorders and rotates the scene's triangles by patches. Returns also how many
-/// pairs were turned.
-pub(super) fn lay_out(
-    scene: &mut Scene,
-    groups: Vec<Group>,
-) -> (Vec<Patch>, Vec<DrawRange>, usize) {
+/// Reorders and rotates the scene's triangles by patches.
+pub(super) fn lay_out(scene: &mut Scene, groups: Vec<Group>) -> (Vec<Patch>, Vec<DrawRange>) {
     let curve = SpaceCurve::through(&scene.positions);
     let mut order: Vec<_> = groups
         .into_iter()
@@ -33,7 +29,6 @@ pub(super) fn lay_out(
 
     let mut patches = Vec::with_capacity(order.len());
     let mut triangles = Vec::with_capacity(scene.triangles.len());
-    let mut turned = 0;
     for (object, kind, _, _, group) in order {
         let laid = Laid::new(scene, group);
         patches.push(Patch {
@@ -44,7 +39,6 @@ pub(super) fn lay_out(
             double_sided: kind.double_sided,
             masked: kind.masked,
         });
-        turned += usize::from(laid.turned);
         triangles.extend(laid.triangles.into_iter().flatten());
     }
     scene.triangles = triangles;
@@ -64,7 +58,7 @@ pub(super) fn lay_out(
             }
         })
         .collect();
-    (patches, ranges, turned)
+    (patches, ranges)
 }
 
 impl Group {
@@ -86,7 +80,6 @@ struct Laid {
     shape: PatchShape,
     corners: [u32; 5],
     triangles: [Option<Triangle>; 3],
-    turned: bool,
 }
 
 impl Laid {
@@ -95,13 +88,12 @@ impl Laid {
         match group {
             Group::Solo(a) => {
                 let a = triangle(a);
-                let a = rotated(a, widest_corner(scene, &a));
+                let a = rotated(a, squarest_corner(scene, &a));
                 let [p, q, r] = a.positions;
                 Self {
                     shape: PatchShape::Solo,
                     corners: [p, q, r, r, r],
                     triangles: [Some(a), None, None],
-                    turned: false,
                 }
             }
             Group::Pair(a, b) => {
@@ -109,15 +101,12 @@ impl Laid {
                 // Corners 1 and 3 are the ends of the shared edge.
                 let a = rotated(a, shared_edge(&a, &b) + 2);
                 let b = rotated(b, shared_edge(&b, &a) + 1);
-                let turned = turned(scene, &a, &b);
-                let [a, b] = turned.unwrap_or([a, b]);
                 let [p, q, s] = a.positions;
                 let r = b.positions[1];
                 Self {
                     shape: PatchShape::Pair,
                     corners: [p, q, r, s, s],
                     triangles: [Some(a), Some(b), None],
-                    turned: turned.is_some(),
                 }
             }
             Group::Triple {
@@ -147,7 +136,6 @@ impl Laid {
                         lower_left,
                     ],
                     triangles: [Some(left), Some(middle), Some(right)],
-                    turned: false,
                 }
             }
         }
@@ -172,22 +160,16 @@ fn shared_edge(a: &Triangle, b: &Triangle) -> usize {
         .expect("grouped triangles share an edge")
 }
 
-/// The corner to lay into the block's corner: of those whose first edge is not
-/// the shorter, since blocks are wide, the one nearest to a right angle.
-fn widest_corner(scene: &Scene, triangle: &Triangle) -> usize {
+/// The corner to lay into the block's corner: the one nearest to a right angle.
+fn squarest_corner(scene: &Scene, triangle: &Triangle) -> usize {
     let position = |corner: usize| scene.positions[triangle.positions[corner % 3] as usize];
-    let badness = |corner: usize| {
-        let (u, v) = (
-            position(corner + 1) - position(corner),
-            position(corner + 2) - position(corner),
-        );
-        let cosine = u.normalize_or_zero().dot(v.normalize_or_zero()).abs();
-        // A hair of tolerance lets equal legs count as wide both ways.
-        let tall = u.length() < 0.999 * v.length();
-        if tall { 2.0 + cosine } else { cosine }
+    let cosine = |corner: usize| {
+        let [u, v] = [1, 2].map(|next| position(corner + next) - position(corner));
+        u.normalize_or_zero().dot(v.normalize_or_zero()).abs()
     };
-    let better = |a: &usize, b: &usize| badness(*a).total_cmp(&badness(*b));
-    (0..3).min_by(better).unwrap_or(0)
+    (0..3)
+        .min_by(|a, b| cosine(*a).total_cmp(&cosine(*b)))
+        .unwrap_or(0)
 }
 
 /// A Z-order curve through the scene: near in space is mostly near on it.

@@ -18,7 +18,6 @@ mod layout;
 mod subdivide;
 #[cfg(test)]
 mod tests;
-mod turn;
 
 use std::fmt;
 
@@ -136,8 +135,6 @@ pub struct PatchReport {
     pub pairs: usize,
     /// Patches of three triangles.
     pub triples: usize,
-    /// Pairs that were turned onto their long side.
-    pub turned: usize,
     /// Edges that were split.
     pub split_edges: usize,
     /// Triangles that splitting added.
@@ -179,7 +176,7 @@ pub fn cut(mut scene: Scene, limits: PatchLimits) -> PatchedScene {
 
     let adjacency = adjacency::Adjacency::new(&scene);
     let groups = grouping::group(&adjacency);
-    let (patches, ranges, turned) = layout::lay_out(&mut scene, groups);
+    let (patches, ranges) = layout::lay_out(&mut scene, groups);
 
     let count = |shape| patches.iter().filter(|patch| patch.shape == shape).count();
     let report = PatchReport {
@@ -187,7 +184,6 @@ pub fn cut(mut scene: Scene, limits: PatchLimits) -> PatchedScene {
         solos: count(PatchShape::Solo),
         pairs: count(PatchShape::Pair),
         triples: count(PatchShape::Triple),
-        turned,
         split_edges,
         added_triangles,
     };

@@ -4,12 +4,12 @@ mod meshes;
 
 use std::collections::{HashMap, HashSet};
 
-use glam::{Vec2, Vec3, Vec4};
+use glam::{Vec2, Vec3};
 use proptest::prelude::*;
 use shadecast_protocol::ObjectId;
 
 use super::*;
-use crate::scene::{Corner, Material};
+use crate::scene::Material;
 use meshes::{grid, icosphere, scene};
 
 const UNLIMITED: PatchLimits = PatchLimits {
@@ -86,55 +86,6 @@ fn a_grid_is_cut_into_its_quads() {
             "{patch:?}"
         );
     }
-}
-
-#[test]
-fn upright_quads_are_turned_onto_their_long_side() {
-    // A wall of quads of 1 by 4, cut along one diagonal or the other.
-    for other_diagonal in [false, true] {
-        let mut source = grid(8);
-        for (position, corner) in source.positions.iter_mut().zip(&mut source.corners) {
-            *position = Vec3::new(position.x, 4.0 * position.y, 0.0);
-            corner.uv[0] = position.truncate();
-        }
-        if other_diagonal {
-            for quad in source.triangles.chunks_exact_mut(2) {
-                let ([a, b, c], d) = (quad[0].positions, quad[1].positions[2]);
-                (quad[0].positions, quad[0].corners) = ([a, b, d], [a, b, d]);
-                (quad[1].positions, quad[1].corners) = ([b, c, d], [b, c, d]);
-            }
-        }
-        let patched = cut(source, UNLIMITED);
-        check(&patched);
-        assert_eq!(patched.report.pairs, 64);
-        assert_eq!(patched.report.turned, if other_diagonal { 64 } else { 0 });
-        for patch in &patched.patches {
-            let [p, q, _, s, _] = patch.corners.map(|i| patched.scene.positions[i as usize]);
-            assert!(p.distance(q) > p.distance(s), "{patch:?}");
-            assert!(
-                (q - p).cross(s - p).z > 0.0,
-                "{patch:?} faces the other way"
-            );
-        }
-    }
-}
-
-#[test]
-fn a_pair_with_a_seam_is_not_turned() {
-    let corners = [
-        Vec3::ZERO,
-        Vec3::X,
-        Vec3::new(1.0, 3.0, 0.0),
-        Vec3::new(0.0, 3.0, 0.0),
-    ];
-    let mut source = scene(corners.to_vec(), [[0, 1, 3], [1, 2, 3]]);
-    assert_eq!(cut(source.clone(), UNLIMITED).report.turned, 1);
-    source.corners.push(Corner {
-        color: Vec4::ZERO,
-        ..source.corners[1]
-    });
-    source.triangles[1].corners[0] = 4;
-    assert_eq!(cut(source, UNLIMITED).report.turned, 0);
 }
 
 #[test]
@@ -327,7 +278,7 @@ proptest! {
         let limits = PatchLimits { longest_edge: limit, most_triangles: 100_000 };
         let split = cut(source.clone(), limits);
         check(&split);
-        prop_assert!(longest_edge(&split.scene) <= 1.002 * limit, "even where pairs were turned");
+        prop_assert!(longest_edge(&split.scene) <= 1.002 * limit);
         prop_assert_eq!(&cut(source, limits).scene.triangles, &split.scene.triangles);
     }
 }

@@ -27,7 +27,8 @@ pub struct BlockRecord {
     pub first_job: u32,
     /// x, and y in the upper half.
     pub position: u32,
-    /// log2 width, log2 height << 4, shape << 8, log2 stride << 10, instance << 16.
+    /// Of the block: log2 width, log2 height << 4, shape << 8, log2 stride << 10,
+    /// whether the patch lies on its side << 14, instance << 16.
     pub layout_bits: u32,
     /// Of the patch, in scene order.
     pub first_triangle: u32,

@@ -17,7 +17,7 @@ struct BlockRecord {
     first_job: u32,
     // x | y << 16
     position: u32,
-    // log2 width | log2 height << 4 | shape << 8 | log2 stride << 10 | instance << 16
+    // log2 width | log2 height << 4 | shape << 8 | log2 stride << 10 | turned << 14 | instance << 16
     layout_bits: u32,
     first_triangle: u32,
     sample_index: u32,
@@ -37,11 +37,18 @@ struct BlockRecord {
 // Samples over which the mean runs where a moving object was met.
 const MOVING_HISTORY: f32 = 6.0;
 
+const TURNED: u32 = 1u << 14u;
+
 struct PatchPoint {
     // Which of the patch's triangles.
     triangle: u32,
     // Weights of its corners 1 and 2.
     b: vec2<f32>,
+}
+
+// The point of a block's patch at `p`, from 0 to 1 along the block's sides.
+fn block_point(layout_bits: u32, p: vec2<f32>) -> PatchPoint {
+    return patch_point((layout_bits >> 8u) & 3u, select(p, p.yx, (layout_bits & TURNED) != 0u));
 }
 
 // The point of a patch at patch coordinates `p`.
@@ -122,9 +129,8 @@ fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     // Kept off the very edge, where two walls of a corner meet.
     p = mix(vec2<f32>(0.02) / extent, 1.0 - vec2<f32>(0.02) / extent, clamp(p, vec2<f32>(0.0), vec2<f32>(1.0)));
 
-    let shape = (job.block.layout_bits >> 8u) & 3u;
     let instance = job.block.layout_bits >> 16u;
-    let point = patch_point(shape, p);
+    let point = block_point(job.block.layout_bits, p);
     let triangle = job.block.first_triangle + point.triangle;
     let p0 = vertex_position(triangle, 0u);
     let e1 = vertex_position(triangle, 1u) - p0;

@@ -11,7 +11,8 @@ pub const NO_BLOCK: u32 = u32::MAX;
 pub struct Move {
     /// x, and y in the upper half, of the new block.
     pub to: u32,
-    /// log2 width, log2 height << 4 of the new block; << 8, << 12 of the old.
+    /// log2 width, log2 height << 4 of the new block; << 8, << 12 of the old;
+    /// 1 << 16 where the patch lies on its side in one of them.
     pub levels: u32,
     /// x, and y in the upper half, of the old block, or [`NO_BLOCK`].
     pub origin: u32,

@@ -5,7 +5,8 @@
 struct Move {
     // x | y << 16 of the new block.
     to: u32,
-    // log2 width | log2 height << 4 of the new, then << 8 and << 12 of the old.
+    // log2 width | log2 height << 4 of the new, then << 8 and << 12 of the old;
+    // 1 << 16 where the patch lies on its side in one of them.
     levels: u32,
     // x | y << 16 of the old block, or NO_BLOCK.
     origin: u32,
@@ -51,7 +52,8 @@ fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         var sharp = vec4<f32>(0.0);
         if (m.origin != NO_BLOCK) {
             // Patch coordinates run over texel centres, at both levels.
-            let q = vec2<f32>(p) * vec2<f32>(old_size - 1u) / vec2<f32>(size - 1u);
+            let uv = vec2<f32>(p) / vec2<f32>(size - 1u);
+            let q = select(uv, uv.yx, (m.levels >> 16u) != 0u) * vec2<f32>(old_size - 1u);
             let low = min(vec2<u32>(q), old_size - 1u);
             let high = min(low + 1u, old_size - 1u);
             let f = q - vec2<f32>(low);
@@ -64,7 +66,7 @@ fn carry_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                 mix(surfaces_before[r1 + low.x], surfaces_before[r1 + high.x], f.x), f.y);
             sharp = mix(mix(crisp_before[r0 + low.x], crisp_before[r0 + high.x], f.x),
                 mix(crisp_before[r1 + low.x], crisp_before[r1 + high.x], f.x), f.y);
-            if (any(old_size != size)) {
+            if (any(old_size != size) || (m.levels >> 16u) != 0u) {
                 content.w = min(content.w, CARRIED_WEIGHT);
             }
         }

@@ -37,7 +37,7 @@ fn demodulated(at: u32) -> vec4<f32> {
 
 // Light around a texel of a block, and how many paths it comes from.
 fn surroundings(block: BlockRecord, p: vec2<i32>, size: vec2<i32>) -> vec4<f32> {
-    let point = patch_point((block.layout_bits >> 8u) & 3u, vec2<f32>(p) / vec2<f32>(size - 1));
+    let point = block_point(block.layout_bits, vec2<f32>(p) / vec2<f32>(size - 1));
     let triangle = block.first_triangle + point.triangle;
     let p0 = vertex_position(triangle, 0u);
     let e1 = vertex_position(triangle, 1u) - p0;

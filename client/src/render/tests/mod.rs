@@ -43,15 +43,18 @@ struct Bench {
 
 impl Bench {
     fn new(stereo: Stereo) -> Self {
-        let gpu = gpu(stereo);
-        let config = RendererConfig {
+        Self::with(RendererConfig {
             eye_size: [SIZE; 2],
             eye_format: FORMAT,
             stereo,
             antialias: false,
-        };
+        })
+    }
+
+    fn with(config: RendererConfig) -> Self {
+        let gpu = gpu(config.stereo);
         let renderer = Renderer::new(&gpu.device, &gpu.queue, config);
-        let eyes = EyeImages::new(&gpu.device, [SIZE; 2], FORMAT);
+        let eyes = EyeImages::new(&gpu.device, config.eye_size, config.eye_format);
         Self {
             gpu,
             renderer,
@@ -179,6 +182,7 @@ impl Geometry {
             server_timing: UpdateTiming::default(),
             timing: ClientTiming::default(),
             vertices: Arc::new(self.vertices),
+            opaque_indices: self.indices.len() as u32,
             indices: Arc::new(self.indices),
             transforms: Arc::new(vec![Pose::IDENTITY]),
             picture: Arc::new(picture),

@@ -47,27 +47,44 @@ fn every_shade_becomes_the_rgb_that_the_standard_gives() {
 #[test]
 #[ignore = "needs a Vulkan driver"]
 fn an_srgb_eye_shows_the_same_bytes() {
-    let gpu = gpu(Stereo::TwoPass);
-    let format = wgpu::TextureFormat::Rgba8UnormSrgb;
-    let config = RendererConfig {
-        eye_size: [SIZE; 2],
-        eye_format: format,
-        stereo: Stereo::TwoPass,
-        antialias: false,
-    };
-    let mut renderer = Renderer::new(&gpu.device, &gpu.queue, config);
-    let eyes = EyeImages::new(&gpu.device, [SIZE; 2], format);
     let grey = [100, 120, 140];
     let frame = Geometry::default()
         .whole_quad(Vec3::new(0.0, 0.0, -1.0), 1.0)
         .frame(picture(16, |_, _| grey));
-    renderer.upload(&frame).expect("a sound frame");
-    let bench = Bench {
-        gpu,
-        renderer,
-        eyes,
-    };
+    let mut bench = Bench::with(RendererConfig {
+        eye_size: [SIZE; 2],
+        eye_format: wgpu::TextureFormat::Rgba8UnormSrgb,
+        stereo: Stereo::TwoPass,
+        antialias: false,
+    });
+    bench.renderer.upload(&frame).expect("a sound frame");
     assert_close(bench.look(Pose::IDENTITY).at(32, 32), expected(grey), 1);
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn antialiasing_takes_means_of_light() {
+    // Its left and right edges run through the middle of a pixel.
+    let frame = Geometry::default()
+        .whole_quad(Vec3::new(0.0, 0.0, -2.0), 1.0 + 1.0 / 32.0)
+        .frame(picture(16, |_, _| WHITE));
+    for (eye_format, half) in [
+        // The square root of a half, and its place on the sRGB curve.
+        (wgpu::TextureFormat::Rgba8Unorm, 180),
+        (wgpu::TextureFormat::Rgba8UnormSrgb, 188),
+    ] {
+        let mut bench = Bench::with(RendererConfig {
+            eye_size: [SIZE; 2],
+            eye_format,
+            stereo: Stereo::TwoPass,
+            antialias: true,
+        });
+        bench.renderer.upload(&frame).expect("a sound frame");
+        let seen = bench.look(Pose::IDENTITY);
+        assert_eq!(seen.columns_in_row(32), Some((15, 48)));
+        assert_close(seen.at(15, 32), [half; 3], 2);
+        assert_close(seen.at(16, 32), [255; 3], 2);
+    }
 }
 
 #[test]
@@ -108,11 +125,13 @@ fn a_mask_cuts_away_its_texels() {
         height: 16,
         coverage,
     }));
+    let all = std::mem::take(&mut frame.opaque_indices);
     let mut bench = Bench::with_frame(&frame);
     let seen = bench.look(Pose::IDENTITY);
     assert_eq!(seen.columns_in_row(20), Some((32, 47)));
     // The next frame has no mask.
     frame.masks = None;
+    frame.opaque_indices = all;
     bench.renderer.upload(&frame).expect("a sound frame");
     let seen = bench.look(Pose::IDENTITY);
     assert_eq!(seen.columns_in_row(20), Some((16, 47)));
