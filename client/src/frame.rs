@@ -6,7 +6,7 @@
 
 use std::sync::Arc;
 
-use shadecast_protocol::{Epoch, FrameId, Pose, UpdateTiming};
+use shadecast_protocol::{ClientTime, Epoch, FrameId, Motion, Pose, UpdateTiming};
 
 /// A corner of a triangle as the vertex shader reads it.
 #[repr(C)]
@@ -14,7 +14,7 @@ use shadecast_protocol::{Epoch, FrameId, Pose, UpdateTiming};
 pub struct DrawVertex {
     /// Metres, in the space of its object.
     pub position: [f32; 3],
-    /// Index into [`ClientFrame::transforms`].
+    /// Index into [`ClientFrame::motions`].
     pub object: u32,
     /// Atlas position in texels; texel centres lie at halves.
     pub texel: [f32; 2],
@@ -79,12 +79,41 @@ pub struct ClientFrame {
     pub indices: Arc<Vec<u32>>,
     /// How many of the indices, from the first on, need no mask.
     pub opaque_indices: u32,
+    /// How long after `scene_time` the objects are where `motions` says, nanoseconds.
+    pub objects_lead: u64,
     /// `world_from_object` of every object; index 0 is the identity.
-    pub transforms: Arc<Vec<Pose>>,
+    pub motions: Arc<Vec<Motion>>,
     /// The shading.
     pub picture: Arc<YuvPicture>,
     /// Present only where a placed patch is alpha-masked.
     pub masks: Option<Arc<MaskAtlas>>,
     /// Patches placed.
     pub patches: u32,
+}
+
+/// Longest time that a motion is believed to go on, seconds: a few updates. An
+/// object of which nothing more is heard then stops instead of flying away.
+const LONGEST_MOTION: f64 = 0.5;
+
+impl ClientFrame {
+    /// The scene's own time at a time of this end, seconds.
+    #[must_use]
+    pub fn scene_seconds(&self, at: ClientTime) -> f64 {
+        self.scene_time as f64 * 1e-9 + self.seconds_since_start(at)
+    }
+
+    /// For how long the objects have moved on, at that time, from where
+    /// `motions` has them; negative before. Half a second at most.
+    #[must_use]
+    pub fn seconds_of_motion(&self, at: ClientTime) -> f32 {
+        let seconds = self.seconds_since_start(at) - self.objects_lead as f64 * 1e-9;
+        seconds.clamp(-LONGEST_MOTION, LONGEST_MOTION) as f32
+    }
+
+    /// Since the server began the frame.
+    fn seconds_since_start(&self, at: ClientTime) -> f64 {
+        let started =
+            i128::from(self.server_timing.started.0) + i128::from(self.timing.client_minus_server);
+        (i128::from(at.0) - started) as f64 * 1e-9
+    }
 }

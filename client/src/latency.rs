@@ -181,7 +181,8 @@ mod tests {
             vertices: Arc::default(),
             indices: Arc::default(),
             opaque_indices: 0,
-            transforms: Arc::default(),
+            objects_lead: 0,
+            motions: Arc::default(),
             picture: Arc::new(YuvPicture {
                 width: 0,
                 height: 0,

@@ -16,14 +16,14 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use shadecast_protocol::{
-    Block, Epoch, ObjectId, PatchGeometry, PatchId, PatchShape, Pose, Update, VertexId,
+    Block, Epoch, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Pose, Update, VertexId,
 };
 
 use crate::{ClientFrame, ClientTiming, DrawVertex, MaskAtlas, YuvPicture};
 
 pub use check::WorldError;
 
-/// Vertices, patches, placements, masks and transforms.
+/// Vertices, patches, placements, masks and motions.
 #[derive(Debug)]
 pub struct World {
     atlas_size: [u16; 2],
@@ -34,7 +34,7 @@ pub struct World {
     patches: HashMap<PatchId, Patch>,
     /// Ordered, so that equal worlds give equal bytes to draw.
     placed: BTreeMap<PatchId, Placed>,
-    transforms: Arc<Vec<Pose>>,
+    motions: Arc<Vec<Motion>>,
     /// Built when first asked for after a change.
     geometry: Option<Geometry>,
     masks: MaskState,
@@ -84,7 +84,7 @@ impl World {
             positions: Vec::new(),
             patches: HashMap::new(),
             placed: BTreeMap::new(),
-            transforms: Arc::new(vec![Pose::IDENTITY]),
+            motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),
             geometry: None,
             masks: MaskState::Built(None),
         }
@@ -112,7 +112,7 @@ impl World {
     }
 
     /// Takes from an update whose picture was lost what outlives its epoch:
-    /// geometry and transforms. Whole, or nothing of it.
+    /// geometry and motions. Whole, or nothing of it.
     ///
     /// # Errors
     /// Names the first thing in the geometry that does not fit this world.
@@ -124,7 +124,7 @@ impl World {
 
     /// What to draw after `update`, the last one that was applied.
     ///
-    /// Geometry, transforms and masks are shared with the frame before where
+    /// Geometry, motions and masks are shared with the frame before where
     /// they did not change.
     #[must_use]
     pub fn frame(
@@ -148,7 +148,8 @@ impl World {
             vertices: geometry.vertices,
             indices: geometry.indices,
             opaque_indices: geometry.opaque_indices,
-            transforms: Arc::clone(&self.transforms),
+            objects_lead: update.objects_lead,
+            motions: Arc::clone(&self.motions),
             picture,
             masks: self.masks(),
             // Placed patches are known patches, which are fewer than `MAX_PATCHES`.
@@ -168,10 +169,10 @@ impl World {
             self.make_room_for(patch.object);
             self.patches.insert(geometry.id, patch);
         }
-        for &(object, world_from_object) in &update.transforms {
+        for &(object, motion) in &update.motions {
             self.make_room_for(object);
             let slot = usize::from(object.0);
-            Arc::make_mut(&mut self.transforms)[slot] = world_from_object;
+            Arc::make_mut(&mut self.motions)[slot] = motion;
         }
     }
 
@@ -195,8 +196,8 @@ impl World {
     /// Objects that have not moved yet stand at the identity.
     fn make_room_for(&mut self, object: ObjectId) {
         let needed = usize::from(object.0) + 1;
-        if self.transforms.len() < needed {
-            Arc::make_mut(&mut self.transforms).resize(needed, Pose::IDENTITY);
+        if self.motions.len() < needed {
+            Arc::make_mut(&mut self.motions).resize(needed, Motion::still(Pose::IDENTITY));
         }
     }
 

@@ -83,7 +83,7 @@ impl Capture {
         let (width, height) = (pixels.width, pixels.height);
         self.writer.write(picture.clone(), pixels);
         let servers_view = headset.cameras(frame.world_from_head);
-        let pixels = headset.drawing.eye_from(servers_view, eye)?;
+        let pixels = headset.drawing.eye_from(servers_view, 0.0, eye)?;
         self.writer.write(unwarped.clone(), pixels);
 
         let EyeCamera {
@@ -101,7 +101,7 @@ impl Capture {
             height,
             seconds,
             pose_age_ms: seconds_between(frame.server_timing.view_sampled, turn.display_at) * 1e3,
-            scene_time_s: scene_time(frame, turn.display_at),
+            scene_time_s: frame.scene_seconds(turn.display_at),
             frame: frame.frame.0,
         });
         Ok(())
@@ -136,16 +136,6 @@ fn side_by_side(left: &Pixels, right: &Pixels) -> Pixels {
             .flat_map(|(left, right)| [left, right].concat())
             .collect(),
     }
-}
-
-/// The scene's own time at a time of the client, seconds.
-fn scene_time(frame: &ClientFrame, at: ClientTime) -> f64 {
-    let begun_on_client = frame
-        .server_timing
-        .started
-        .0
-        .saturating_add_signed(frame.timing.client_minus_server);
-    frame.scene_time as f64 * 1e-9 + seconds_between(ClientTime(begun_on_client), at)
 }
 
 /// Negative when `end` is before `start`.

@@ -56,10 +56,12 @@ impl Drawing {
     pub(crate) fn draw(
         &self,
         cameras: [EyeCamera; 2],
+        seconds_of_motion: f32,
         finish: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<()> {
         let mut encoder = self.encoder();
-        self.renderer.draw(&mut encoder, cameras, &self.eyes);
+        self.renderer
+            .draw(&mut encoder, cameras, seconds_of_motion, &self.eyes);
         finish(&mut encoder);
         self.gpu.queue.submit([encoder.finish()]);
         self.gpu
@@ -74,13 +76,19 @@ impl Drawing {
         self.read(self.eyes.texture(), eye as u32)
     }
 
-    /// One eye as it would look from elsewhere.
-    pub(crate) fn eye_from(&self, cameras: [EyeCamera; 2], eye: usize) -> Result<Pixels> {
+    /// One eye as it would look from elsewhere, or at another time.
+    pub(crate) fn eye_from(
+        &self,
+        cameras: [EyeCamera; 2],
+        seconds_of_motion: f32,
+        eye: usize,
+    ) -> Result<Pixels> {
         let size = self.eyes.texture().size();
         let elsewhere =
             EyeImages::new(&self.gpu.device, [size.width, size.height], self.eye_format);
         let mut encoder = self.encoder();
-        self.renderer.draw(&mut encoder, cameras, &elsewhere);
+        self.renderer
+            .draw(&mut encoder, cameras, seconds_of_motion, &elsewhere);
         self.gpu.queue.submit([encoder.finish()]);
         self.read(elsewhere.texture(), eye as u32)
     }

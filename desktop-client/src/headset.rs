@@ -5,14 +5,13 @@ use std::sync::Arc;
 use anyhow::Result;
 use shadecast_client::render::{EyeCamera, FrameReceiver, frame_channel};
 use shadecast_client::{ClientFrame, Drawn, HeadView, Input, Latency};
-use shadecast_protocol::{ClientTime, EyeView, Pose};
+use shadecast_protocol::{ClientTime, EyeView, Motion, Pose};
 
 use crate::args::Args;
 use crate::clock::Clock;
 use crate::drawing::Drawing;
 use crate::network::{Event, Network};
 use crate::status::StatusLine;
-use crate::trace::Motion;
 
 /// Largest atlas that the software decoder is trusted with, texels a side.
 const MAX_ATLAS_SIDE: u32 = 4096;
@@ -90,7 +89,7 @@ impl Headset {
         let began = self.clock.now();
         let interrupted = self.hear()?;
         let fresh = self.take_newest();
-        let head = head.in_world(self.world_from_play);
+        let head = head.seen_from(self.world_from_play);
         self.network.tell(Input::View(HeadView {
             sampled_at: began,
             display_at,
@@ -101,7 +100,11 @@ impl Headset {
             eye_resolution: [self.eye_size; 2],
         }));
         let cameras = self.cameras(head.pose);
-        self.drawing.draw(cameras, finish)?;
+        let seconds_of_motion = self
+            .shown
+            .as_ref()
+            .map_or(0.0, |frame| frame.seconds_of_motion(display_at));
+        self.drawing.draw(cameras, seconds_of_motion, finish)?;
         self.measure(began, fresh);
         Ok(Turn {
             display_at,

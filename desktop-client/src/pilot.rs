@@ -4,10 +4,10 @@ use std::collections::HashSet;
 use std::f32::consts::FRAC_PI_2;
 
 use glam::{EulerRot, Quat, Vec3};
-use shadecast_protocol::Pose;
+use shadecast_protocol::{Motion, Pose};
 use winit::keyboard::KeyCode;
 
-use crate::trace::{EYE_HEIGHT, Motion};
+use crate::trace::EYE_HEIGHT;
 
 /// A brisk walk, m/s.
 const SPEED: f32 = 1.5;

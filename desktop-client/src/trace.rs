@@ -5,35 +5,13 @@
 use std::f64::consts::TAU;
 
 use glam::{EulerRot, Quat, Vec3};
-use shadecast_protocol::Pose;
+use shadecast_protocol::{Motion, Pose};
 
 use crate::trace_file::TraceFile;
 
 /// Half the span over which velocities are taken, seconds: shorter than any
 /// motion of a head, longer than the rounding of positions.
 const VELOCITY_HALF_SPAN: f64 = 0.005;
-
-/// A head and how it moves.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Motion {
-    /// In the play space, or in the world after [`Motion::in_world`].
-    pub(crate) pose: Pose,
-    /// m/s.
-    pub(crate) linear_velocity: Vec3,
-    /// rad/s about the axes of the outer space.
-    pub(crate) angular_velocity: Vec3,
-}
-
-impl Motion {
-    /// The same motion in the world of the scene.
-    pub(crate) fn in_world(self, world_from_play: Pose) -> Self {
-        Self {
-            pose: world_from_play.then(self.pose),
-            linear_velocity: world_from_play.orientation * self.linear_velocity,
-            angular_velocity: world_from_play.orientation * self.angular_velocity,
-        }
-    }
-}
 
 /// A head's path.
 #[derive(Clone, Debug)]
@@ -45,17 +23,10 @@ pub(crate) enum HeadTrace {
 impl HeadTrace {
     /// The head at `seconds` since the start.
     pub(crate) fn at(&self, seconds: f64) -> Motion {
-        let [before, after] = [-VELOCITY_HALF_SPAN, VELOCITY_HALF_SPAN]
+        let ends = [-VELOCITY_HALF_SPAN, VELOCITY_HALF_SPAN]
             .map(|offset| self.pose((seconds + offset).max(0.0)));
         let span = (2.0 * VELOCITY_HALF_SPAN) as f32;
-        let turned = (after.orientation * before.orientation.conjugate()).normalize();
-        // Of the two quaternions of a rotation, the one of the short way.
-        let turned = if turned.w < 0.0 { -turned } else { turned };
-        Motion {
-            pose: self.pose(seconds),
-            linear_velocity: (after.position - before.position) / span,
-            angular_velocity: turned.to_scaled_axis() / span,
-        }
+        Motion::along(self.pose(seconds), ends, span)
     }
 
     fn pose(&self, seconds: f64) -> Pose {
@@ -171,9 +142,7 @@ mod tests {
         for second in 1..60 {
             let now = trace.at(f64::from(second));
             let later = trace.at(f64::from(second) + 0.02);
-            let predicted = now
-                .pose
-                .extrapolate(now.linear_velocity, now.angular_velocity, 0.02);
+            let predicted = now.after(0.02);
             assert!((predicted.position - later.pose.position).length() < 1e-3);
             assert!(predicted.orientation.angle_between(later.pose.orientation) < 2e-3);
         }
@@ -184,22 +153,5 @@ mod tests {
         let pose = |seed| Sway::new(seed).pose(3.0);
         assert_eq!(pose(1), pose(1));
         assert_ne!(pose(1), pose(2));
-    }
-
-    #[test]
-    fn a_motion_turns_with_its_space() {
-        let quarter = Pose {
-            position: Vec3::X,
-            orientation: Quat::from_rotation_y(std::f32::consts::FRAC_PI_2),
-        };
-        let motion = Motion {
-            pose: Pose::IDENTITY,
-            linear_velocity: Vec3::NEG_Z,
-            angular_velocity: Vec3::Y,
-        };
-        let turned = motion.in_world(quarter);
-        assert!((turned.linear_velocity - Vec3::NEG_X).length() < 1e-6);
-        assert!((turned.angular_velocity - Vec3::Y).length() < 1e-6);
-        assert_eq!(turned.pose.position, Vec3::X);
     }
 }

@@ -113,11 +113,13 @@ pub(crate) fn update(update: &Update) -> Result<(), WireError> {
         rules.demand(bytes == Some(mask.bits.len()), "length of a mask")?;
     }
 
-    let objects = update.transforms.iter().map(|(object, _)| object.0.into());
+    let objects = update.motions.iter().map(|(object, _)| object.0.into());
     rules.ascending(objects, 1 << 16, "object id")?;
-    for &(object, pose) in &update.transforms {
-        rules.demand(object != ObjectId::WORLD, "transform of the world")?;
-        rules.pose(pose, "object pose")?;
+    for (object, motion) in &update.motions {
+        rules.demand(*object != ObjectId::WORLD, "motion of the world")?;
+        rules.pose(motion.pose, "object pose")?;
+        rules.vector(motion.linear_velocity, "object velocity")?;
+        rules.vector(motion.angular_velocity, "object velocity")?;
     }
     Ok(())
 }

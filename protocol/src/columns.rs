@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use zstd::{bulk::Compressor, stream::read::Decoder, zstd_safe::CParameter};
 
 use crate::{
-    Block, BlockMask, Epoch, FrameId, Level, ObjectId, PatchGeometry, PatchId, PatchShape,
+    Block, BlockMask, Epoch, FrameId, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape,
     Placement, Pose, Update, UpdateTiming, Vertex, VertexId, WireError, check,
     delta::{from_planes, gaps, ids, planes},
     wire::{MAX_PATCHES, MAX_UPDATE_BYTES, MAX_VERTICES, parse, within},
@@ -86,7 +86,8 @@ struct Columns {
     timing: UpdateTiming,
     world_from_head: Pose,
     scene_time: u64,
-    transforms: Vec<(ObjectId, Pose)>,
+    objects_lead: u64,
+    motions: Vec<(ObjectId, Motion)>,
     /// Gaps between ids.
     vertices: Vec<u32>,
     /// x, y and z, each as four planes of bytes; see [`planes`](crate::delta::planes).
@@ -138,7 +139,8 @@ impl From<&Update> for Columns {
             timing: update.timing,
             world_from_head: update.world_from_head,
             scene_time: update.scene_time,
-            transforms: update.transforms.clone(),
+            objects_lead: update.objects_lead,
+            motions: update.motions.clone(),
             vertices: gaps(update.vertices.iter().map(|vertex| vertex.id.0)),
             positions: positions.iter().flat_map(|axis| planes(axis)).collect(),
             patches: gaps(update.patches.iter().map(|patch| patch.id.0)),
@@ -176,6 +178,7 @@ impl Columns {
             timing: self.timing,
             world_from_head: self.world_from_head,
             scene_time: self.scene_time,
+            objects_lead: self.objects_lead,
             vertices: self.vertices()?,
             patches: self.patches()?,
             removals: ids(&self.removals, MAX_PATCHES)?
@@ -184,7 +187,7 @@ impl Columns {
                 .collect(),
             masks: self.masks(&placements)?,
             placements,
-            transforms: self.transforms,
+            motions: self.motions,
         })
     }
 

@@ -23,6 +23,6 @@ pub use message::{
     Acknowledgement, ClockReply, Codec, Hello, Picture, Refusal, ResetReason, Secret, Sky,
     ToClient, ToServer, ViewReport, Welcome,
 };
-pub use pose::{EyeView, Fov, Pose};
+pub use pose::{EyeView, Fov, Motion, Pose};
 pub use update::{BlockMask, PatchGeometry, PatchShape, Placement, Update, UpdateTiming, Vertex};
 pub use wire::{MAX_MESSAGE_BYTES, MAX_PATCHES, MAX_UPDATE_BYTES, MAX_VERTICES, PROTOCOL_VERSION};

@@ -71,6 +71,61 @@ impl Pose {
     }
 }
 
+/// A pose and how it changes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Motion {
+    /// `outer_from_inner` at some moment.
+    pub pose: Pose,
+    /// m/s in the outer space.
+    pub linear_velocity: Vec3,
+    /// rad/s about axes of the outer space.
+    pub angular_velocity: Vec3,
+}
+
+impl Motion {
+    /// A pose that stays.
+    #[must_use]
+    pub const fn still(pose: Pose) -> Self {
+        Self {
+            pose,
+            linear_velocity: Vec3::ZERO,
+            angular_velocity: Vec3::ZERO,
+        }
+    }
+
+    /// At `pose`, with the mean velocities of a way from `before` to `after` in
+    /// `seconds`, which turns by less than half a circle. No time, no velocity.
+    #[must_use]
+    pub fn along(pose: Pose, [before, after]: [Pose; 2], seconds: f32) -> Self {
+        let turned = (after.orientation * before.orientation.conjugate()).normalize();
+        // Of the two quaternions of a rotation, the one of the short way.
+        let turned = if turned.w < 0.0 { -turned } else { turned };
+        let per_second = if seconds > 0.0 { seconds.recip() } else { 0.0 };
+        Self {
+            pose,
+            linear_velocity: (after.position - before.position) * per_second,
+            angular_velocity: turned.to_scaled_axis() * per_second,
+        }
+    }
+
+    /// The pose `seconds` after the moment.
+    #[must_use]
+    pub fn after(self, seconds: f32) -> Pose {
+        self.pose
+            .extrapolate(self.linear_velocity, self.angular_velocity, seconds)
+    }
+
+    /// The same motion seen from a space in which the outer one stands still.
+    #[must_use]
+    pub fn seen_from(self, space_from_outer: Pose) -> Self {
+        Self {
+            pose: space_from_outer.then(self.pose),
+            linear_velocity: space_from_outer.orientation * self.linear_velocity,
+            angular_velocity: space_from_outer.orientation * self.angular_velocity,
+        }
+    }
+}
+
 /// A field of view by the signed angles of its four sides, radians, as
 /// `XrFovf`: left and down are negative for an ordinary eye.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -170,4 +225,46 @@ pub struct EyeView {
     pub head_from_eye: Pose,
     /// What it sees.
     pub fov: Fov,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_motion_turns_with_its_space() {
+        let quarter = Pose {
+            position: Vec3::X,
+            orientation: Quat::from_rotation_y(std::f32::consts::FRAC_PI_2),
+        };
+        let motion = Motion {
+            pose: Pose::IDENTITY,
+            linear_velocity: Vec3::NEG_Z,
+            angular_velocity: Vec3::Y,
+        };
+        let turned = motion.seen_from(quarter);
+        assert!((turned.linear_velocity - Vec3::NEG_X).length() < 1e-6);
+        assert!((turned.angular_velocity - Vec3::Y).length() < 1e-6);
+        assert_eq!(turned.pose.position, Vec3::X);
+    }
+
+    #[test]
+    fn a_motion_leads_from_one_end_of_its_way_to_the_other() {
+        let before = Pose {
+            position: Vec3::new(1e5, 2.0, 3.0),
+            orientation: Quat::from_rotation_x(3.0),
+        };
+        let after = Pose {
+            position: Vec3::new(1e5 + 1.0, 1.0, 3.0),
+            // The other quaternion of the same rotation: the short way counts.
+            orientation: -Quat::from_rotation_x(3.5),
+        };
+        let motion = Motion::along(before, [before, after], 0.25);
+        assert_eq!(motion.linear_velocity, Vec3::new(4.0, -4.0, 0.0));
+        let found = motion.after(0.25);
+        assert!(found.orientation.angle_between(after.orientation) < 1e-3);
+        assert_eq!(found.position, after.position);
+        let standstill = Motion::along(before, [before, after], 0.0);
+        assert_eq!(standstill, Motion::still(before));
+    }
 }

@@ -4,7 +4,8 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Block, ClientTime, Epoch, FrameId, ObjectId, PatchId, Pose, ServerTime, VertexId, ViewSeq,
+    Block, ClientTime, Epoch, FrameId, Motion, ObjectId, PatchId, Pose, ServerTime, VertexId,
+    ViewSeq,
 };
 
 /// A vertex that becomes visible for the first time.
@@ -118,9 +119,11 @@ pub struct Update {
     pub timing: UpdateTiming,
     /// The pose of the head that it was made for.
     pub world_from_head: Pose,
-    /// The scene's own time at `timing.started`, nanoseconds. Moving objects are
-    /// sent where they will be when the frame is seen.
+    /// The scene's own time at `timing.started`, nanoseconds.
     pub scene_time: u64,
+    /// How long after that time the objects are where `motions` says, which is
+    /// about when the frame will be seen, nanoseconds.
+    pub objects_lead: u64,
     /// Vertices that are new to the client, by ascending id.
     pub vertices: Vec<Vertex>,
     /// Patches that are new to the client, by ascending id.
@@ -131,6 +134,6 @@ pub struct Update {
     pub placements: Vec<Placement>,
     /// Masks of alpha-masked patches among `placements`, by ascending id.
     pub masks: Vec<BlockMask>,
-    /// Objects that moved since the last update, by ascending id; never the world.
-    pub transforms: Vec<(ObjectId, Pose)>,
+    /// Objects that move or have just stopped, by ascending id; never the world.
+    pub motions: Vec<(ObjectId, Motion)>,
 }

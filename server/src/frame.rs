@@ -5,14 +5,15 @@
 
 use std::time::Duration;
 
-use shadecast_protocol::{FrameId, Picture, Pose, Update, UpdateTiming};
+use glam::Vec3;
+use shadecast_protocol::{FrameId, Motion, Picture, Pose, Update, UpdateTiming};
 
 use crate::{
     atlas::{Atlas, AtlasError, AtlasStats, Request, ideal_size},
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
-    light::{Job, Light, Schedule},
+    light::{Job, Lasting, Light, Schedule},
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
     scene::{Material, Scene},
@@ -22,13 +23,11 @@ use crate::{
 /// Samples over which a diffuse texel's mean runs at most: beyond it the error
 /// is below a code value of the video.
 const LONGEST_HISTORY: f32 = 4096.0;
-/// The same where the head's motion changes what is seen in the surface.
-const GLOSSY_HISTORY: f32 = 8.0;
+/// The same on an object that moves, and its light with it.
+const MOVING_HISTORY: f32 = 8.0;
 /// Texels asked for per pixel and axis. More than one, because bilinear lookup
 /// blurs by about a texel and the outer half texels of a block lie beyond its patch.
 const TEXELS_PER_PIXEL: f32 = 1.12;
-/// Roughness above which a dielectric's highlight is as good as diffuse.
-const ROUGH: f32 = 0.5;
 
 /// What a frame is made for.
 #[derive(Clone, Debug)]
@@ -39,8 +38,8 @@ pub struct FrameOrder {
     pub prediction: Prediction,
     /// The scene's own time.
     pub scene_time: Duration,
-    /// The scene's time at which moving objects are shown: when the frame will be seen.
-    pub objects_time: Duration,
+    /// From then until the frame will be seen: moving objects are shown as they will be.
+    pub objects_lead: Duration,
     /// Paths that may be traced.
     pub paths: u32,
     /// Begin a new epoch.
@@ -141,14 +140,14 @@ impl Pipeline {
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
         let light = Light::new(&gpu, &gpu_scene, size)?;
         let picture = PictureConversion::new(&gpu, light.shown(), size)?;
-        let histories = scene
+        let lasting = scene
             .patches
             .iter()
-            .map(|patch| longest_history(&scene.scene, patch))
+            .map(|patch| lasting(&scene.scene, patch))
             .collect();
         Ok(Self {
             known: Known::nothing(&scene),
-            schedule: Schedule::new(histories),
+            schedule: Schedule::new(lasting),
             gpu,
             gpu_scene,
             scene,
@@ -190,9 +189,11 @@ impl Pipeline {
         if order.reset || order.new_client {
             self.atlas.force_reset();
         }
-        let poses: Vec<Pose> = (self.scene.scene.objects.iter())
-            .map(|object| object.world_from_object(order.objects_time))
+        let objects_time = order.scene_time + order.objects_lead;
+        let motions: Vec<Motion> = (self.scene.scene.objects.iter())
+            .map(|object| object.motion(objects_time))
             .collect();
+        let poses: Vec<Pose> = motions.iter().map(|motion| motion.pose).collect();
         self.gpu_scene.set_poses(&self.gpu, &poses);
 
         let visible =
@@ -210,24 +211,30 @@ impl Pipeline {
             self.schedule
                 .placed(placement.patch, old.is_some(), resized);
         }
-        let news = self.known.news(&self.scene, &placed.placements, &poses);
+        let news = self.known.news(&self.scene, &placed.placements, &motions);
         stages.atlas = lap();
 
         let lit = visible.iter().filter_map(|patch| {
             Some((patch.patch, self.atlas.block_of(patch.patch)?, patch.pixels))
         });
-        let jobs = self.schedule.choose(&self.scene.patches, lit, order.paths);
+        let eye = eye_of(&order.prediction);
+        let in_objects = poses
+            .iter()
+            .map(|world_from_object| world_from_object.inverse().transform_point(eye));
+        let eyes: Vec<Vec3> = std::iter::once(eye).chain(in_objects).collect();
+        let jobs = self
+            .schedule
+            .choose(&self.scene.patches, lit, order.paths, &eyes);
         let mut encoder = self
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.light.record_moves(&self.gpu, &mut encoder, &placed)?;
         self.gpu.queue.submit([encoder.finish()]);
-        let eye = eye_of(&order.prediction);
         let moved: Vec<Job> = (placed.placements.iter())
             .map(|placed| {
                 self.schedule
-                    .job(&self.scene.patches, placed.patch, placed.block)
+                    .job(&self.scene.patches, placed.patch, placed.block, &eyes)
             })
             .collect();
         let noise = self
@@ -254,12 +261,13 @@ impl Pipeline {
                 timing: order.timing,
                 world_from_head: order.prediction.view.world_from_head,
                 scene_time: order.scene_time.as_nanos() as u64,
+                objects_lead: order.objects_lead.as_nanos() as u64,
                 vertices: news.vertices,
                 patches: news.patches,
                 removals: placed.removals,
                 placements: placed.placements,
                 masks: news.masks,
-                transforms: news.transforms,
+                motions: news.motions,
             },
             picture: Picture {
                 frame: order.frame,
@@ -308,15 +316,20 @@ impl Pipeline {
     }
 }
 
-/// A mirror's image moves with the head, so its history must be short.
-fn longest_history(scene: &Scene, patch: &Patch) -> f32 {
-    let material: &Material =
-        &scene.materials[scene.triangles[patch.first_triangle as usize].material as usize];
-    let glossy =
-        material.roughness < ROUGH || (material.metallic > 0.5 && material.roughness < 0.8);
-    if glossy && material.metallic_roughness_texture.is_none() || patch.object.0 != 0 {
-        GLOSSY_HISTORY
-    } else {
-        LONGEST_HISTORY
+/// What a patch's material and place say about how long its light stays true.
+fn lasting(scene: &Scene, patch: &Patch) -> Lasting {
+    let triangle = &scene.triangles[patch.first_triangle as usize];
+    let material: &Material = &scene.materials[triangle.material as usize];
+    // A texture makes parts of the surface smoother than its factor says.
+    let textured = material.metallic_roughness_texture.is_some();
+    let roughness = material.roughness * if textured { 0.5 } else { 1.0 };
+    Lasting {
+        longest_history: if patch.object.0 == 0 {
+            LONGEST_HISTORY
+        } else {
+            MOVING_HISTORY
+        },
+        point: scene.positions[triangle.positions[0] as usize],
+        alpha: roughness * roughness,
     }
 }

@@ -1,7 +1,7 @@
 //! What the client already knows, and so what an update must tell it.
 
 use shadecast_protocol::{
-    BlockMask, ObjectId, PatchGeometry, PatchId, Placement, Pose, Vertex, VertexId,
+    BlockMask, Motion, ObjectId, PatchGeometry, PatchId, Placement, Pose, Vertex, VertexId,
 };
 
 use crate::{mask::block_mask, patches::PatchedScene};
@@ -11,7 +11,7 @@ use crate::{mask::block_mask, patches::PatchedScene};
 pub struct Known {
     vertices: Vec<bool>,
     patches: Vec<bool>,
-    poses: Vec<Pose>,
+    motions: Vec<Motion>,
 }
 
 /// The geometry of an update: see [`Update`](shadecast_protocol::Update).
@@ -23,8 +23,8 @@ pub struct News {
     pub patches: Vec<PatchGeometry>,
     /// Of the alpha-masked patches that were placed.
     pub masks: Vec<BlockMask>,
-    /// Of the objects that moved.
-    pub transforms: Vec<(ObjectId, Pose)>,
+    /// Of the objects that move or have just stopped.
+    pub motions: Vec<(ObjectId, Motion)>,
 }
 
 impl Known {
@@ -34,13 +34,18 @@ impl Known {
         Self {
             vertices: vec![false; scene.scene.positions.len()],
             patches: vec![false; scene.patches.len()],
-            poses: vec![Pose::IDENTITY; scene.scene.objects.len()],
+            motions: vec![Motion::still(Pose::IDENTITY); scene.scene.objects.len()],
         }
     }
 
     /// What the client must be told so that `placements` mean something to it;
-    /// `poses[n]` is `world_from_object` of `ObjectId(n + 1)`.
-    pub fn news(&mut self, scene: &PatchedScene, placements: &[Placement], poses: &[Pose]) -> News {
+    /// `motions[n]` is that of `ObjectId(n + 1)`.
+    pub fn news(
+        &mut self,
+        scene: &PatchedScene,
+        placements: &[Placement],
+        motions: &[Motion],
+    ) -> News {
         let mut news = News::default();
         for placement in placements {
             let PatchId(id) = placement.patch;
@@ -69,10 +74,10 @@ impl Known {
             });
         }
         news.vertices.sort_by_key(|vertex| vertex.id);
-        for ((object, known), &pose) in (1..).map(ObjectId).zip(&mut self.poses).zip(poses) {
-            if *known != pose {
-                *known = pose;
-                news.transforms.push((object, pose));
+        let known_and_new = self.motions.iter_mut().zip(motions);
+        for (object, (known, &motion)) in (1..).map(ObjectId).zip(known_and_new) {
+            if std::mem::replace(known, motion) != motion || motion != Motion::still(motion.pose) {
+                news.motions.push((object, motion));
             }
         }
         news

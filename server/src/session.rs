@@ -204,7 +204,7 @@ impl Session {
             frame: stream.next_frame,
             prediction: Prediction::linear(&view, horizon, self.config.head_samples),
             scene_time: Duration::from_nanos(now.0),
-            objects_time: Duration::from_nanos(now.0) + lead,
+            objects_lead: lead,
             paths,
             reset: std::mem::take(&mut stream.reset),
             new_client: std::mem::take(&mut stream.new_client),

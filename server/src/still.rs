@@ -48,6 +48,24 @@ pub struct Still {
     pub radiance: Vec<Vec3>,
 }
 
+/// A picture in the making: samples can be added and looked at in turn.
+#[derive(Debug)]
+pub struct Film {
+    size: [u32; 2],
+    samples: u32,
+    parameters: wgpu::Buffer,
+    sum: wgpu::Buffer,
+    group: wgpu::BindGroup,
+}
+
+impl Film {
+    /// Samples a pixel so far.
+    #[must_use]
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+}
+
 /// The kernels of still pictures.
 #[derive(Debug)]
 pub struct StillPass {
@@ -80,56 +98,83 @@ impl StillPass {
         })
     }
 
-    /// Renders `samples` samples a pixel; objects stand where they were last moved to.
+    /// An unexposed film.
     ///
     /// # Errors
-    /// When the driver fails.
-    pub fn render(
+    /// When the device has no room for it.
+    pub fn film(&self, gpu: &Gpu, size: [u32; 2]) -> Result<Film, GpuError> {
+        let bytes = u64::from(size[0]) * u64::from(size[1]) * 16;
+        let parameters = gpu.uniform("still", size_of::<StillParameters>());
+        let sum = gpu.scratch("still", bytes)?;
+        Ok(Film {
+            size,
+            samples: 0,
+            group: bind(gpu, &self.layout, &[&parameters, &sum]),
+            parameters,
+            sum,
+        })
+    }
+
+    /// Adds `samples` samples a pixel to what is on the film; objects stand
+    /// where they were last moved to. Samples of one seed and of films of one
+    /// size continue one sequence.
+    pub fn expose(
         &self,
         gpu: &Gpu,
         gpu_scene: &GpuScene,
-        camera: &Camera,
+        film: &mut Film,
+        view: (Pose, [f32; 4]),
         samples: u32,
         seed: u32,
-    ) -> Result<Still, GpuError> {
-        let bytes = u64::from(camera.width) * u64::from(camera.height) * 16;
-        let parameters = gpu.uniform("still", size_of::<StillParameters>());
-        let sum = gpu.scratch("still", bytes)?;
-        let readback = gpu.readback("still", bytes);
-        let group = bind(gpu, &self.layout, &[&parameters, &sum]);
-        for sample_index in 0..samples.max(1) {
-            let pose = camera.world_from_eye;
+    ) {
+        let (pose, tangents) = view;
+        let pixels = film.size[0] * film.size[1];
+        // Whole samples, as many as a wave holds.
+        let at_once = (self.paths.longest_wave() / pixels).max(1);
+        let last = film.samples.saturating_add(samples);
+        while film.samples < last {
+            let now = at_once.min(last - film.samples);
             let values = StillParameters {
                 world_from_eye: rows_of_affine(Mat3::from_quat(pose.orientation), pose.position),
-                tangents: camera.fov.tangents(),
-                size: [camera.width, camera.height],
-                sample_index,
+                tangents,
+                size: film.size,
+                sample_index: film.samples,
                 seed,
             };
             gpu.queue
-                .write_buffer(&parameters, 0, bytemuck::bytes_of(&values));
+                .write_buffer(&film.parameters, 0, bytemuck::bytes_of(&values));
             let ends = Ends {
                 start: &self.start,
                 finish: &self.add,
-                group: &group,
+                group: &film.group,
                 from_camera: true,
             };
-            self.paths
-                .follow(gpu, gpu_scene, ends, camera.width * camera.height);
+            self.paths.follow(gpu, gpu_scene, ends, pixels * now);
+            film.samples += now;
         }
+    }
+
+    /// What is on the film; waits for all of it.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn develop(&self, gpu: &Gpu, film: &Film) -> Result<Still, GpuError> {
+        let bytes = film.sum.size();
+        let readback = gpu.readback("still", bytes);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&sum, 0, &readback, 0, bytes);
+        encoder.copy_buffer_to_buffer(&film.sum, 0, &readback, 0, bytes);
         let radiance = gpu.submit_and_read(encoder, &readback, bytes, |bytes| {
             bytemuck::cast_slice::<u8, [f32; 4]>(bytes)
                 .iter()
                 .map(|[r, g, b, count]| Vec3::new(*r, *g, *b) / count.max(1.0))
                 .collect()
         })?;
+        let [width, height] = film.size;
         Ok(Still {
-            width: camera.width,
-            height: camera.height,
+            width,
+            height,
             radiance,
         })
     }
@@ -150,13 +195,10 @@ impl StillPass {
                 position: Vec3::ZERO,
                 orientation: Quat::from_rotation_y(turn as f32 * std::f32::consts::FRAC_PI_2),
             };
-            let camera = Camera {
-                world_from_eye: eye.then(turned),
-                fov: Fov::symmetric(std::f32::consts::FRAC_PI_2),
-                width: 32,
-                height: 32,
-            };
-            let still = self.render(gpu, gpu_scene, &camera, EXPOSURE_SAMPLES, 1)?;
+            let view = (eye.then(turned), [-1.0, 1.0, 1.0, -1.0]);
+            let mut film = self.film(gpu, [32; 2])?;
+            self.expose(gpu, gpu_scene, &mut film, view, EXPOSURE_SAMPLES, 1);
+            let still = self.develop(gpu, &film)?;
             let weights = Vec3::new(0.2126, 0.7152, 0.0722);
             luminances.extend(
                 still
@@ -211,7 +253,49 @@ impl StillRenderer {
         &self.gpu.adapter
     }
 
-    /// Renders with objects where they are at `scene_time`.
+    /// An unexposed film for pictures of this width and height.
+    ///
+    /// # Errors
+    /// When the device has no room for it.
+    pub fn film(&self, size: [u32; 2]) -> Result<Film, GpuError> {
+        self.pass.film(&self.gpu, size)
+    }
+
+    /// Adds samples to a film that is as large as the camera's picture, with
+    /// objects where they are at `scene_time`, and waits for them.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn expose(
+        &mut self,
+        film: &mut Film,
+        camera: &Camera,
+        scene_time: Duration,
+        samples: u32,
+        seed: u32,
+    ) -> Result<(), GpuError> {
+        let poses: Vec<Pose> = self
+            .scene
+            .objects
+            .iter()
+            .map(|object| object.world_from_object(scene_time))
+            .collect();
+        self.gpu_scene.set_poses(&self.gpu, &poses);
+        let view = (camera.world_from_eye, camera.fov.tangents());
+        self.pass
+            .expose(&self.gpu, &self.gpu_scene, film, view, samples, seed);
+        self.gpu.wait()
+    }
+
+    /// What is on a film.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn develop(&self, film: &Film) -> Result<Still, GpuError> {
+        self.pass.develop(&self.gpu, film)
+    }
+
+    /// A picture in one go.
     ///
     /// # Errors
     /// When the driver fails.
@@ -221,16 +305,9 @@ impl StillRenderer {
         scene_time: Duration,
         samples: u32,
         seed: u32,
-    ) -> anyhow::Result<Still> {
-        let poses: Vec<Pose> = self
-            .scene
-            .objects
-            .iter()
-            .map(|object| object.world_from_object(scene_time))
-            .collect();
-        self.gpu_scene.set_poses(&self.gpu, &poses);
-        Ok(self
-            .pass
-            .render(&self.gpu, &self.gpu_scene, camera, samples, seed)?)
+    ) -> Result<Still, GpuError> {
+        let mut film = self.film([camera.width, camera.height])?;
+        self.expose(&mut film, camera, scene_time, samples, seed)?;
+        self.develop(&film)
     }
 }

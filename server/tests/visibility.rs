@@ -113,7 +113,7 @@ fn first_frame(scene: &PatchedScene, prediction: &Prediction) -> Frame {
         frame: FrameId(0),
         prediction: prediction.clone(),
         scene_time: Duration::ZERO,
-        objects_time: Duration::ZERO,
+        objects_lead: Duration::ZERO,
         paths: 1024,
         reset: true,
         new_client: true,

@@ -76,7 +76,7 @@ fn layouts_match() {
         sky_zenith,
         light_count,
         sky_horizon,
-        light_weight,
+        punctual_count,
         sky_ground,
         instance_count,
         sun_direction,
@@ -109,7 +109,7 @@ fn layouts_match() {
         alpha_cutoff,
         f0,
         double_sided,
-        emission_weight,
+        spare,
         padding,
         textures
     );
@@ -119,16 +119,19 @@ fn layouts_match() {
         kind,
         triangle,
         instance,
-        cumulative,
+        trail,
         position,
-        probability,
+        padding,
         intensity,
         range,
         direction,
         cos_outer,
         cos_inner,
         area,
-        padding
+        spare
+    );
+    same_layout!(
+        &atlas, LightNode, centre, radius, axis, cos_spread, power, child, padding
     );
     same_layout!(
         &atlas,
@@ -158,7 +161,7 @@ fn layouts_match() {
         sample_index,
         patch_id,
         longest_history,
-        padding
+        glossy_keep
     );
     same_layout!(&atlas, Wave, path_count, first_job, cull, step);
     assert_eq!(u64::from(members(&atlas, "PathState").0), STATE_BYTES);

@@ -73,7 +73,7 @@ fn picture_and_update_take_effect_together(loopback: &Loopback) {
         assert!(shown.picture == expected.picture, "picture of {frame:?}");
         assert_eq!(shown.vertices, expected.vertices, "{frame:?}");
         assert_eq!(shown.indices, expected.indices, "{frame:?}");
-        assert_eq!(shown.transforms, expected.transforms, "{frame:?}");
+        assert_eq!(shown.motions, expected.motions, "{frame:?}");
         assert!(shown.patches > 100, "{} patches", shown.patches);
         let bright = shown.picture.y.iter().filter(|luma| **luma > 60).count();
         assert!(bright > shown.picture.y.len() / 10, "{bright} lit texels");

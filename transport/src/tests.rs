@@ -90,12 +90,13 @@ fn update(frame: u32) -> Update {
         timing: UpdateTiming::default(),
         world_from_head: Pose::IDENTITY,
         scene_time: 0,
+        objects_lead: 0,
         vertices: vec![],
         patches: vec![],
         removals: vec![],
         placements: vec![],
         masks: vec![],
-        transforms: vec![],
+        motions: vec![],
     }
 }
 

@@ -3,6 +3,7 @@
 use std::{ops::Range, sync::Arc};
 
 use glam::Mat4;
+use shadecast_protocol::{Motion, Pose};
 
 use crate::{ClientFrame, DrawVertex};
 
@@ -14,7 +15,7 @@ pub(super) struct Mesh {
     /// How many of the indices, from the first on, need no mask.
     opaque_indices: u32,
     transforms: GrowingBuffer,
-    objects: usize,
+    motions: Arc<Vec<Motion>>,
 }
 
 impl Mesh {
@@ -24,7 +25,7 @@ impl Mesh {
             indices: Uploaded::new("indices", wgpu::BufferUsages::INDEX),
             opaque_indices: 0,
             transforms: GrowingBuffer::new("transforms", wgpu::BufferUsages::STORAGE),
-            objects: 0,
+            motions: Arc::default(),
         }
     }
 
@@ -33,7 +34,7 @@ impl Mesh {
         [
             size_of_val(frame.vertices.as_slice()),
             size_of_val(frame.indices.as_slice()),
-            frame.transforms.len() * size_of::<Mat4>(),
+            frame.motions.len() * size_of::<Mat4>(),
         ]
         .into_iter()
         .max()
@@ -51,18 +52,32 @@ impl Mesh {
         self.vertices.upload(device, queue, &frame.vertices);
         self.indices.upload(device, queue, &frame.indices);
         self.opaque_indices = frame.opaque_indices.min(self.indices.count());
-        self.objects = frame.transforms.len();
+        self.motions = Arc::clone(&frame.motions);
         if !self.moves() {
             return false;
         }
-        let matrices: Vec<Mat4> = frame.transforms.iter().map(|pose| pose.matrix()).collect();
+        let matrices = self.matrices_after(0.0);
         self.transforms
             .write(device, queue, bytemuck::cast_slice(&matrices))
     }
 
+    /// Moves the objects to where they are `seconds` after the moment of their
+    /// motions, for what is submitted from now on.
+    pub(super) fn move_objects(&self, queue: &wgpu::Queue, seconds: f32) {
+        if let (true, Some(buffer)) = (self.moves(), self.transforms()) {
+            let matrices = self.matrices_after(seconds);
+            queue.write_buffer(buffer, 0, bytemuck::cast_slice(&matrices));
+        }
+    }
+
+    fn matrices_after(&self, seconds: f32) -> Vec<Mat4> {
+        let poses = self.motions.iter().map(|motion| motion.after(seconds));
+        poses.map(Pose::matrix).collect()
+    }
+
     /// True when there is more than the world that stands still.
     pub(super) fn moves(&self) -> bool {
-        self.objects > 1
+        self.motions.len() > 1
     }
 
     pub(super) fn transforms(&self) -> Option<&wgpu::Buffer> {

@@ -137,13 +137,17 @@ impl Renderer {
     }
 
     /// Draws the left and the right eye into the layers of `target`, which has
-    /// the size and format of the configuration.
+    /// the size and format of the configuration. Objects are where they are
+    /// `seconds_of_motion` after the moment of the frame's motions, in whatever
+    /// is submitted before the next call.
     pub fn draw(
         &self,
         encoder: &mut wgpu::CommandEncoder,
         cameras: [EyeCamera; 2],
+        seconds_of_motion: f32,
         target: &EyeImages,
     ) {
+        self.mesh.move_objects(&self.queue, seconds_of_motion);
         match &self.shrink {
             Some(shrink) => {
                 self.draw_eyes(encoder, cameras, shrink.large());

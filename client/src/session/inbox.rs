@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use shadecast_protocol::{
-    ClientTime, FrameId, PatchGeometry, PatchId, Picture, Placement, Pose, Update, Vertex,
+    ClientTime, FrameId, Motion, PatchGeometry, PatchId, Picture, Placement, Update, Vertex,
 };
 
 /// Most frames that wait: about a second. Whoever is further behind starts anew.
@@ -110,7 +110,7 @@ impl Weighed for Update {
             + size_of_val::<[PatchGeometry]>(&self.patches)
             + size_of_val::<[PatchId]>(&self.removals)
             + size_of_val::<[Placement]>(&self.placements)
-            + size_of_val::<[(_, Pose)]>(&self.transforms)
+            + size_of_val::<[(_, Motion)]>(&self.motions)
             + masks
     }
 }

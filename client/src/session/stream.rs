@@ -6,7 +6,7 @@
 //! decoded and its update is here. Where a frame is lost, the chain of pictures
 //! is broken: the next one to show is the IDR picture of a newer epoch. Updates
 //! of the frames between are not shown, but what they told of geometry and
-//! transforms is learnt, because the server may not say it again.
+//! motions is learnt, because the server may not say it again.
 
 use std::collections::VecDeque;
 use std::sync::Arc;

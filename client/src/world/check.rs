@@ -75,7 +75,7 @@ pub enum WorldError {
 }
 
 impl World {
-    /// Vertices, patches and transforms.
+    /// Vertices, patches and motions.
     ///
     /// Sending known geometry again unchanged is allowed: a server may do so
     /// after a reset instead of remembering what arrived.
@@ -114,7 +114,7 @@ impl World {
         within_limit("patches", self.patches.len() + new_patches, MAX_PATCHES)?;
 
         let moves_world = |(object, _): &(ObjectId, _)| *object == ObjectId::WORLD;
-        if update.transforms.iter().any(moves_world) {
+        if update.motions.iter().any(moves_world) {
             return Err(WorldError::WorldMoved);
         }
         Ok(())

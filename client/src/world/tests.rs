@@ -7,8 +7,8 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use proptest::prelude::*;
 use shadecast_protocol::{
-    BlockMask, FrameId, Level, MAX_VERTICES, PatchGeometry, PatchShape, Placement, UpdateTiming,
-    Vertex,
+    BlockMask, ClientTime, FrameId, Level, MAX_VERTICES, Motion, PatchGeometry, PatchShape,
+    Placement, ServerTime, UpdateTiming, Vertex,
 };
 
 use super::*;
@@ -20,12 +20,13 @@ fn update(epoch: u32) -> Update {
         timing: UpdateTiming::default(),
         world_from_head: Pose::IDENTITY,
         scene_time: 0,
+        objects_lead: 0,
         vertices: vec![],
         patches: vec![],
         removals: vec![],
         placements: vec![],
         masks: vec![],
-        transforms: vec![],
+        motions: vec![],
     }
 }
 
@@ -82,15 +83,18 @@ fn world() -> World {
     world
 }
 
-fn frame(world: &mut World) -> ClientFrame {
-    let picture = YuvPicture {
+fn picture() -> Arc<YuvPicture> {
+    Arc::new(YuvPicture {
         width: 0,
         height: 0,
         y: vec![],
         u: vec![],
         v: vec![],
-    };
-    world.frame(&update(1), Arc::new(picture), ClientTiming::default())
+    })
+}
+
+fn frame(world: &mut World) -> ClientFrame {
+    world.frame(&update(1), picture(), ClientTiming::default())
 }
 
 #[test]
@@ -165,7 +169,7 @@ fn what_does_not_change_is_shared() {
     let second = frame(&mut world);
     assert!(Arc::ptr_eq(&first.vertices, &second.vertices));
     assert!(Arc::ptr_eq(&first.indices, &second.indices));
-    assert!(Arc::ptr_eq(&first.transforms, &second.transforms));
+    assert!(Arc::ptr_eq(&first.motions, &second.motions));
 
     let removal = Update {
         removals: vec![PatchId(2)],
@@ -243,19 +247,53 @@ fn objects_stand_still_until_they_move() {
         ..update(1)
     };
     world.apply(&update).unwrap();
-    assert_eq!(*frame(&mut world).transforms, [Pose::IDENTITY; 3]);
+    assert_eq!(
+        *frame(&mut world).motions,
+        [Motion::still(Pose::IDENTITY); 3]
+    );
     assert_eq!(frame(&mut world).vertices.last().unwrap().object, 2);
 
-    let pose = Pose {
-        position: Vec3::X,
-        orientation: Quat::from_rotation_y(1.0),
+    let motion = Motion {
+        pose: Pose {
+            position: Vec3::X,
+            orientation: Quat::from_rotation_y(1.0),
+        },
+        linear_velocity: Vec3::Z,
+        angular_velocity: Vec3::ZERO,
     };
     let moved = Update {
-        transforms: vec![(ObjectId(2), pose)],
+        motions: vec![(ObjectId(2), motion)],
         ..self::update(1)
     };
     world.apply(&moved).unwrap();
-    assert_eq!(frame(&mut world).transforms[2], pose);
+    assert_eq!(frame(&mut world).motions[2], motion);
+}
+
+#[test]
+fn motion_goes_on_until_it_is_not_believed_any_more() {
+    let second = 1_000_000_000;
+    let update = Update {
+        scene_time: 20 * second,
+        objects_lead: second / 4,
+        timing: UpdateTiming {
+            started: ServerTime(3 * second),
+            ..UpdateTiming::default()
+        },
+        ..update(1)
+    };
+    let timing = ClientTiming {
+        client_minus_server: 2 * second as i64,
+        ..ClientTiming::default()
+    };
+    let frame = world().frame(&update, picture(), timing);
+    let at = |quarters: u64| ClientTime(5 * second + quarters * second / 4);
+    assert_eq!(frame.scene_seconds(at(2)), 20.5);
+    for (quarters, expected) in [(0, -0.25), (1, 0.0), (2, 0.25), (3, 0.5), (100, 0.5)] {
+        assert_eq!(frame.seconds_of_motion(at(quarters)), expected);
+    }
+    // Clocks that make no sense move nothing far.
+    assert_eq!(frame.seconds_of_motion(ClientTime(0)), -0.5);
+    assert_eq!(frame.seconds_of_motion(ClientTime(u64::MAX)), 0.5);
 }
 
 #[test]

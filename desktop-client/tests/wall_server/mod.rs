@@ -154,12 +154,13 @@ fn update(frame: FrameId, view: Option<(ViewReport, ServerTime)>, now: ServerTim
             orientation: Quat::from_rotation_y(std::f32::consts::PI),
         },
         scene_time: now.0,
+        objects_lead: 0,
         vertices: vec![],
         patches: vec![],
         removals: vec![],
         placements: vec![],
         masks: vec![],
-        transforms: vec![],
+        motions: vec![],
     };
     if frame == FrameId(0) {
         let corners = [(-1.0, 0.6), (1.0, 0.6), (1.0, 2.6), (-1.0, 2.6)];

@@ -3,7 +3,6 @@
 use std::{
     fmt::Write as _,
     path::{Path, PathBuf},
-    time::Instant,
 };
 
 use anyhow::{Context, Result, ensure};
@@ -11,11 +10,10 @@ use image::{
     RgbImage,
     imageops::{self, FilterType},
 };
-use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{
     recorded::Sample,
-    references::{Reference, References, View},
+    references::{Reference, View},
     window::Window,
     write,
 };
@@ -52,17 +50,9 @@ impl SampleError {
     }
 }
 
-/// Renders a reference for the window of every sample, by the deadline if
-/// there is one, and measures the sample against it. Writes the reference
-/// beside the sample, and `compare_*.png`.
-pub(super) fn measure(
-    out: &Path,
-    samples: &[Sample],
-    windows: &[Window],
-    references: &mut References,
-    deadline: Option<Instant>,
-) -> Result<Vec<SampleError>> {
-    let views = samples
+/// What the references of the samples' windows are taken from.
+pub(super) fn views(samples: &[Sample], windows: &[Window]) -> Result<Vec<View>> {
+    samples
         .iter()
         .zip(windows)
         .map(|(sample, window)| {
@@ -71,28 +61,31 @@ pub(super) fn measure(
                 scene_time: sample.scene_time()?,
             })
         })
-        .collect::<Result<Vec<View>>>()?;
-    if let Some(deadline) = deadline {
-        references.plan(&views, deadline)?;
-    }
-    let bar = progress_bar(2 * samples.len() as u64, references.samples_per_pixel());
+        .collect()
+}
+
+/// Measures the window of every sample against its reference. Writes the
+/// reference beside the sample, and `compare_*.png`.
+pub(super) fn measure(
+    out: &Path,
+    samples: &[Sample],
+    windows: &[Window],
+    references: &[Reference],
+) -> Result<Vec<SampleError>> {
     let shown = shown(samples.len());
     let mut errors = Vec::with_capacity(samples.len());
-    for (index, ((sample, &window), view)) in samples.iter().zip(windows).zip(&views).enumerate() {
-        let reference = references.render(index as u32, view, || bar.inc(1))?;
+    let with_window = samples.iter().zip(windows).zip(references);
+    for (index, ((sample, &window), reference)) in with_window.enumerate() {
         let picture = part(out, &sample.picture, sample, window)?;
         let unwarped = part(out, &sample.unwarped, sample, window)?;
         let map = flip(&reference.picture, &picture)?;
-        errors.push(error(
-            sample, window, &picture, &unwarped, &reference, &map,
-        )?);
+        errors.push(error(sample, window, &picture, &unwarped, reference, &map)?);
         save(&reference_path(out, sample), &reference.picture)?;
         if let Some(number) = shown.iter().position(|&shown| shown == index) {
             let row = side_by_side(&[&picture, &reference.picture, &map.picture()]);
             save(&out.join(format!("compare_{number:02}.png")), &row)?;
         }
     }
-    bar.finish_and_clear();
     Ok(errors)
 }
 
@@ -196,14 +189,6 @@ fn save(path: &Path, picture: &RgbImage) -> Result<()> {
     picture
         .save(path)
         .with_context(|| format!("cannot write {}", path.display()))
-}
-
-fn progress_bar(halves: u64, samples_per_pixel: u32) -> ProgressBar {
-    let style = ProgressStyle::with_template("references {msg} {wide_bar} {pos}/{len} {eta}")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(halves)
-        .with_style(style)
-        .with_message(format!("of {samples_per_pixel} samples a pixel"))
 }
 
 #[cfg(test)]

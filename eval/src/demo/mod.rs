@@ -16,11 +16,11 @@ use std::{
 };
 
 use anyhow::{Context, Result, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
 use shadecast_server::scene::{self, Scene};
 
 use processes::{Client, Server};
 use recorded::{ClientRecord, ServerRecord};
-use references::References;
 use summary::Summary;
 use window::Window;
 
@@ -58,7 +58,7 @@ pub struct Options {
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u32,
     /// Seconds that all references together may take.
-    #[arg(long, value_name = "N", default_value_t = 45)]
+    #[arg(long, value_name = "N", default_value_t = 52)]
     pub reference_seconds: u32,
     /// Compares whole pictures instead of a window of each, however long that takes.
     #[arg(long, conflicts_with = "reference_seconds")]
@@ -93,15 +93,18 @@ pub fn run(options: &Options) -> Result<String> {
 
     eprintln!("rendering {} references", client.samples.len());
     let deadline = Instant::now() + Duration::from_secs(options.reference_seconds.into());
-    let scene = load(options)?;
-    let mut references = References::new(&scene, server.exposure, options.seed)?;
-    let errors = errors::measure(
-        &options.out,
-        &client.samples,
-        &windows(options, &client),
-        &mut references,
+    let windows = windows(options, &client);
+    let bar = reference_bar();
+    let (references, reference_samples) = references::render(
+        &load(options)?,
+        server.exposure,
+        options.seed,
+        &errors::views(&client.samples, &windows)?,
         (!options.whole).then_some(deadline),
+        |share| bar.set_position((share * 100.0) as u64),
     )?;
+    bar.finish_and_clear();
+    let errors = errors::measure(&options.out, &client.samples, &windows, &references)?;
     errors::write_csv(&options.out.join("error.csv"), &errors)?;
 
     let summary = Summary::new(
@@ -109,7 +112,7 @@ pub fn run(options: &Options) -> Result<String> {
         &client,
         &server,
         &errors,
-        references.samples_per_pixel(),
+        reference_samples,
         began.elapsed(),
     );
     let targets = targets::of(&summary);
@@ -121,6 +124,12 @@ pub fn run(options: &Options) -> Result<String> {
         targets::text(&targets),
         options.out.join("report.md").display()
     ))
+}
+
+fn reference_bar() -> ProgressBar {
+    let style = ProgressStyle::with_template("references {wide_bar} {percent} % {eta}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(100).with_style(style)
 }
 
 /// What of each sample is compared.

@@ -11,26 +11,22 @@ use glam::Vec3;
 use image::{Rgb, RgbImage};
 use shadecast_server::{
     scene::Scene,
-    still::{Camera, Still, StillRenderer},
+    still::{Camera, Film, Still, StillRenderer},
     tone_map,
 };
 
 use crate::{MetricError, mean_squared_error};
 
-/// Fewest samples a pixel of one half, even on a machine that is too slow for
-/// them.
+/// Samples a pixel that each half gets in a round over all references: few, so
+/// that the last round ends near the deadline.
+const SAMPLES_A_ROUND: u32 = 4;
+/// Fewest samples a pixel of one half, even on a machine that is too slow for them.
 const MIN_SAMPLES: u32 = 8;
 /// Most: beyond, the noise is below one level of eight bits.
 const MAX_SAMPLES: u32 = 1024;
 /// Of one half where no deadline chooses: as good as windows in the demo's time
 /// on two cores.
-const SAMPLES_WITHOUT_DEADLINE: u32 = 24;
-/// Samples a pixel by which the speed is measured: enough that they and not the
-/// beginning and end of a picture take the time.
-const PROBE_SAMPLES: u32 = 4;
-/// Every how manyth reference the speed is measured in. What it costs then is a
-/// few hundredths of what the references do.
-const PROBE_STEP: usize = 3;
+const SAMPLES_WITHOUT_DEADLINE: u32 = 40;
 
 /// What a reference is taken from.
 #[derive(Clone, Copy, Debug)]
@@ -40,81 +36,83 @@ pub(super) struct View {
     pub(super) scene_time: Duration,
 }
 
-/// Renders references, each with as many samples as the others.
-pub(super) struct References {
-    renderer: StillRenderer,
+/// Renders references of `views`, round by round, until a round more would miss
+/// the deadline; all of them have as many samples. `progress` hears of the share
+/// that is done. Returns the samples a pixel of a whole reference besides.
+pub(super) fn render(
+    scene: &Scene,
     exposure: f32,
     seed: u32,
-    /// Of one half; chosen by [`Self::plan`].
-    samples: u32,
+    views: &[View],
+    deadline: Option<Instant>,
+    progress: impl Fn(f32),
+) -> Result<(Vec<Reference>, u32)> {
+    let mut renderer = StillRenderer::new(scene).context("cannot render references")?;
+    let mut films = Vec::with_capacity(views.len());
+    for View { camera, .. } in views {
+        let film = || renderer.film([camera.width, camera.height]);
+        films.push([film()?, film()?]);
+    }
+    let began = Instant::now();
+    let mut rounds = Rounds::default();
+    while rounds.go_on(deadline.map(|deadline| deadline.duration_since(began))) {
+        for (index, (view, halves)) in (0..).zip(views.iter().zip(&mut films)) {
+            for (half, film) in (0..).zip(halves) {
+                let seed = seed.wrapping_add(2 * index + half);
+                renderer.expose(film, &view.camera, view.scene_time, SAMPLES_A_ROUND, seed)?;
+            }
+            let of_round = (index + 1) as f32 / views.len() as f32;
+            progress(rounds.share(of_round, deadline.map(|deadline| deadline - began)));
+        }
+        rounds.done(began.elapsed());
+    }
+    let develop = |film: &Film| renderer.develop(film);
+    let references = films
+        .iter()
+        .map(|[one, other]| Ok(Reference::new(&[develop(one)?, develop(other)?], exposure)))
+        .collect::<Result<_>>()?;
+    Ok((references, 2 * rounds.samples()))
 }
 
-impl References {
-    pub(super) fn new(scene: &Scene, exposure: f32, seed: u32) -> Result<Self> {
-        Ok(Self {
-            renderer: StillRenderer::new(scene).context("cannot render references")?,
-            exposure,
-            seed,
-            samples: SAMPLES_WITHOUT_DEADLINE,
-        })
+/// How many rounds there were, and when the last one ended.
+#[derive(Clone, Copy, Debug, Default)]
+struct Rounds {
+    count: u32,
+    elapsed: Duration,
+}
+
+impl Rounds {
+    /// Of one half.
+    fn samples(self) -> u32 {
+        self.count * SAMPLES_A_ROUND
     }
 
-    /// Chooses the samples so that references of `views` end by `deadline`.
-    pub(super) fn plan(&mut self, views: &[View], deadline: Instant) -> Result<()> {
-        // The first dispatches compile the kernels; their time does not count.
-        if let Some(first) = views.first() {
-            self.probe(first)?;
-        }
-        let began = Instant::now();
-        let probed = views.iter().step_by(PROBE_STEP);
-        let probes = probed.len().max(1);
-        for view in probed {
-            self.probe(view)?;
-        }
-        let one_sample = began
-            .elapsed()
-            .div_f64(probes as f64 * f64::from(PROBE_SAMPLES))
-            * views.len() as u32;
-        let left = deadline.saturating_duration_since(Instant::now());
-        self.samples = samples_that_fit(left, one_sample);
-        Ok(())
+    fn done(&mut self, elapsed: Duration) {
+        self.count += 1;
+        self.elapsed = elapsed;
     }
 
-    fn probe(&mut self, view: &View) -> Result<Still> {
-        let View { camera, scene_time } = view;
-        self.renderer
-            .render(camera, *scene_time, PROBE_SAMPLES, self.seed)
-    }
-
-    /// Of a whole reference, both halves.
-    pub(super) fn samples_per_pixel(&self) -> u32 {
-        2 * self.samples
-    }
-
-    /// The `index`-th reference; `progress` hears of each half.
-    pub(super) fn render(
-        &mut self,
-        index: u32,
-        view: &View,
-        progress: impl Fn(),
-    ) -> Result<Reference> {
-        let mut half = |seed: u32| {
-            let still = self
-                .renderer
-                .render(&view.camera, view.scene_time, self.samples, seed)?;
-            progress();
-            anyhow::Ok(still)
+    /// Whether another round, as long as those before, ends in `time`.
+    fn go_on(self, time: Option<Duration>) -> bool {
+        let Some(time) = time else {
+            return self.samples() < SAMPLES_WITHOUT_DEADLINE;
         };
-        let first_seed = self.seed.wrapping_add(2 * index);
-        let halves = [half(first_seed)?, half(first_seed.wrapping_add(1))?];
-        Ok(Reference::new(&halves, self.exposure))
+        let next = self.elapsed + self.elapsed / self.count.max(1);
+        self.samples() < MIN_SAMPLES || (self.samples() < MAX_SAMPLES && next <= time)
     }
-}
 
-/// Samples of one half, when one sample of all references takes `one_sample`.
-fn samples_that_fit(left: Duration, one_sample: Duration) -> u32 {
-    let samples = left.as_secs_f64() / (2.0 * one_sample.as_secs_f64()).max(1e-9);
-    (samples as u32).clamp(MIN_SAMPLES, MAX_SAMPLES)
+    /// What is done of the whole, when `of_round` of the next round is.
+    fn share(self, of_round: f32, time: Option<Duration>) -> f32 {
+        let rounds = self.count as f32 + of_round;
+        let whole = match time {
+            None => (SAMPLES_WITHOUT_DEADLINE / SAMPLES_A_ROUND) as f32,
+            Some(time) => {
+                let one = self.elapsed.as_secs_f32() / self.count.max(1) as f32;
+                (time.as_secs_f32() / one.max(1e-3)).max(rounds)
+            }
+        };
+        (rounds / whole).min(1.0)
+    }
 }
 
 /// A tone-mapped reference and its two tone-mapped halves.
@@ -162,12 +160,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn samples_fill_the_time_within_bounds() {
+    fn rounds_fill_the_time_within_bounds() {
         let second = Duration::from_secs(1);
-        let millisecond = Duration::from_millis(1);
-        assert_eq!(samples_that_fit(40 * second, 960 * millisecond), 20);
-        assert_eq!(samples_that_fit(Duration::ZERO, second), MIN_SAMPLES);
-        assert_eq!(samples_that_fit(40 * second, Duration::ZERO), MAX_SAMPLES);
+        let rounds_in = |time: Option<Duration>, one: Duration| {
+            let mut rounds = Rounds::default();
+            while rounds.go_on(time) {
+                rounds.done(rounds.elapsed + one);
+            }
+            rounds.count
+        };
+        assert_eq!(rounds_in(Some(10 * second), second), 10);
+        assert_eq!(rounds_in(Some(10 * second), 3 * second), 3);
+        assert_eq!(rounds_in(Some(Duration::ZERO), second), 2, "never fewer");
+        assert_eq!(rounds_in(Some(second), Duration::ZERO), 256, "never more");
+        assert_eq!(rounds_in(None, second), 10);
     }
 
     #[test]

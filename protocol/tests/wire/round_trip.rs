@@ -6,9 +6,9 @@ use glam::{Quat, Vec3};
 use proptest::{array::uniform2, collection::vec, prelude::*, sample::select};
 use shadecast_protocol::{
     Acknowledgement, Block, BlockMask, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId,
-    Hello, Level, MAX_PATCHES, MAX_VERTICES, ObjectId, PatchGeometry, PatchId, PatchShape, Picture,
-    Placement, Pose, Refusal, ResetReason, Secret, ServerTime, Sky, ToClient, ToServer, Update,
-    UpdateTiming, Vertex, VertexId, ViewReport, ViewSeq, Welcome,
+    Hello, Level, MAX_PATCHES, MAX_VERTICES, Motion, ObjectId, PatchGeometry, PatchId, PatchShape,
+    Picture, Placement, Pose, Refusal, ResetReason, Secret, ServerTime, Sky, ToClient, ToServer,
+    Update, UpdateTiming, Vertex, VertexId, ViewReport, ViewSeq, Welcome,
 };
 
 use crate::samples::{to_client, to_server};
@@ -165,12 +165,12 @@ fn update() -> impl Strategy<Value = Update> {
     let removals = prop::collection::btree_set(0..MAX_PATCHES, 0..60);
     let placements =
         prop::collection::btree_map(0..MAX_PATCHES, (block(), any::<Option<u8>>()), 0..60);
-    let transforms = prop::collection::btree_map(1..=u16::MAX, pose(), 0..4);
-    let head = (any::<[u32; 3]>(), any::<[u64; 5]>(), pose());
-    (head, vertices, patches, removals, placements, transforms).prop_map(assemble)
+    let motions = prop::collection::btree_map(1..=u16::MAX, motion(), 0..4);
+    let head = (any::<[u32; 3]>(), any::<[u64; 6]>(), pose());
+    (head, vertices, patches, removals, placements, motions).prop_map(assemble)
 }
 
-type Head = ([u32; 3], [u64; 5], Pose);
+type Head = ([u32; 3], [u64; 6], Pose);
 type Patch = (u16, PatchShape, bool, [u32; 5]);
 
 type Parts = (
@@ -179,11 +179,11 @@ type Parts = (
     BTreeMap<u32, Patch>,
     BTreeSet<u32>,
     BTreeMap<u32, (Block, Option<u8>)>,
-    BTreeMap<u16, Pose>,
+    BTreeMap<u16, Motion>,
 );
 
 fn assemble(parts: Parts) -> Update {
-    let (head, vertices, patches, removals, placements, transforms) = parts;
+    let (head, vertices, patches, removals, placements, motions) = parts;
     let (ids, times, world_from_head) = head;
     let vertex = |(id, position)| Vertex {
         id: VertexId(id),
@@ -208,6 +208,7 @@ fn assemble(parts: Parts) -> Update {
         },
         world_from_head,
         scene_time: times[4],
+        objects_lead: times[5],
         vertices: vertices.into_iter().map(vertex).collect(),
         patches: patches.into_iter().map(patch).collect(),
         removals: removals.into_iter().map(PatchId).collect(),
@@ -219,9 +220,9 @@ fn assemble(parts: Parts) -> Update {
                 block,
             })
             .collect(),
-        transforms: transforms
+        motions: motions
             .into_iter()
-            .map(|(id, pose)| (ObjectId(id), pose))
+            .map(|(id, motion)| (ObjectId(id), motion))
             .collect(),
     }
 }
@@ -246,8 +247,8 @@ fn geometry() -> impl Strategy<Value = Patch> {
 fn block() -> impl Strategy<Value = Block> {
     (1..=13_u8, 1..=13_u8, uniform2(0.0..1.0_f64)).prop_map(|(a, b, position)| {
         let level = Level {
-            width: a.max(b),
-            height: a.min(b),
+            width: a,
+            height: b,
         };
         let (width, height) = level.size();
         let even = |t: f64, side: u32| (t * f64::from((8192 - side) / 2)) as u16 * 2;
@@ -256,6 +257,14 @@ fn block() -> impl Strategy<Value = Block> {
             y: even(position[1], height),
             level,
         }
+    })
+}
+
+fn motion() -> impl Strategy<Value = Motion> {
+    (pose(), point(), point()).prop_map(|(pose, linear_velocity, angular_velocity)| Motion {
+        pose,
+        linear_velocity,
+        angular_velocity,
     })
 }
 

@@ -2,8 +2,8 @@
 
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
-    BlockMask, ClientTime, Codec, Hello, ObjectId, PatchId, Picture, Pose, ServerTime, ToClient,
-    ToServer, Update, VertexId, ViewReport, Welcome, WireError,
+    BlockMask, ClientTime, Codec, Hello, Motion, ObjectId, PatchId, Picture, Pose, ServerTime,
+    ToClient, ToServer, Update, VertexId, ViewReport, Welcome, WireError,
 };
 
 use crate::samples;
@@ -72,7 +72,7 @@ fn bad_welcome(change: impl FnOnce(&mut Welcome)) -> &'static str {
     let mut welcome = samples::welcome();
     change(&mut welcome);
     let body = postcard::to_stdvec(&welcome).unwrap();
-    let bytes = [&b"shadecast\x01\x00\x10"[..], &body].concat();
+    let bytes = [&b"shadecast\x02\x00\x10"[..], &body].concat();
     let what = refused(ToClient::decode(&bytes));
     assert_eq!(refused(ToClient::Welcome(welcome).encode()), what);
     what
@@ -147,7 +147,7 @@ fn an_update_is_finite() {
         "vertex position"
     );
     assert_eq!(
-        bad_update(|u| u.transforms[0].1.position.x = nan),
+        bad_update(|u| u.motions[0].1.pose.position.x = nan),
         "object pose"
     );
 }
@@ -168,12 +168,9 @@ fn ids_of_an_update_ascend_below_their_limits() {
     assert_eq!(bad_update(|u| u.removals.reverse()), "removal");
     assert_eq!(bad_update(|u| u.placements.swap(0, 1)), "placement");
     assert_eq!(bad_update(|u| u.masks.reverse()), "mask");
-    assert_eq!(bad_update(|u| u.transforms.reverse()), "object id");
-    let world = (ObjectId::WORLD, Pose::IDENTITY);
-    assert_eq!(
-        bad_update(|u| u.transforms[0] = world),
-        "transform of the world"
-    );
+    assert_eq!(bad_update(|u| u.motions.reverse()), "object id");
+    let world = (ObjectId::WORLD, Motion::still(Pose::IDENTITY));
+    assert_eq!(bad_update(|u| u.motions[0] = world), "motion of the world");
 }
 
 #[test]

@@ -3,9 +3,9 @@
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
     Acknowledgement, Block, BlockMask, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId,
-    Hello, Level, ObjectId, PatchGeometry, PatchId, PatchShape, Picture, Placement, Pose, Refusal,
-    ResetReason, Secret, ServerTime, Sky, ToClient, ToServer, Update, UpdateTiming, Vertex,
-    VertexId, ViewReport, ViewSeq, Welcome,
+    Hello, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Picture, Placement, Pose,
+    Refusal, ResetReason, Secret, ServerTime, Sky, ToClient, ToServer, Update, UpdateTiming,
+    Vertex, VertexId, ViewReport, ViewSeq, Welcome,
 };
 
 pub(crate) fn pose() -> Pose {
@@ -125,6 +125,7 @@ pub(crate) fn update() -> Update {
         },
         world_from_head: pose(),
         scene_time: 123_456_789,
+        objects_lead: 250_000_000,
         vertices: vec![vertex(4, 0.25), vertex(5, 0.75), vertex(900, -8.0)],
         patches: vec![
             patch(2, &[4, 5, 900]),
@@ -148,7 +149,17 @@ pub(crate) fn update() -> Update {
                 bits: vec![0xff, 0x00, 0x81, 0x7e, 1, 2, 3, 4],
             },
         ],
-        transforms: vec![(ObjectId(1), pose()), (ObjectId(5), Pose::IDENTITY)],
+        motions: vec![
+            (
+                ObjectId(1),
+                Motion {
+                    pose: pose(),
+                    linear_velocity: Vec3::new(0.5, -0.25, 0.0),
+                    angular_velocity: Vec3::Y,
+                },
+            ),
+            (ObjectId(5), Motion::still(Pose::IDENTITY)),
+        ],
     }
 }
 

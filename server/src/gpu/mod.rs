@@ -8,7 +8,7 @@ use wgpu::util::DeviceExt;
 pub use scene::GpuScene;
 
 /// Storage buffers that the light kernels bind at once.
-const STORAGE_BUFFERS: u32 = 22;
+const STORAGE_BUFFERS: u32 = 23;
 
 /// Why there is no usable GPU.
 #[derive(Debug, Error)]
@@ -163,6 +163,17 @@ impl Gpu {
         })
     }
 
+    /// Waits until all that was submitted is done.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn wait(&self) -> Result<(), GpuError> {
+        self.device
+            .poll(wgpu::PollType::wait_indefinitely())
+            .map(|_| ())
+            .map_err(|error| GpuError::Lost(error.to_string()))
+    }
+
     /// Submits the encoder's work, waits for it, and hands the first `bytes`
     /// of `buffer` to `read`.
     ///
@@ -182,9 +193,7 @@ impl Gpu {
             // The receiver lives until the result is in.
             let _ = sender.send(result);
         });
-        self.device
-            .poll(wgpu::PollType::wait_indefinitely())
-            .map_err(|error| GpuError::Lost(error.to_string()))?;
+        self.wait()?;
         receiver
             .recv()
             .map_err(|error| GpuError::Lost(error.to_string()))?

@@ -1,6 +1,7 @@
 //! The scene as the kernels read it: trees, triangles, materials, texels and lamps.
 
 mod lamps;
+mod light_tree;
 mod materials;
 mod texels;
 mod trees;
@@ -11,7 +12,8 @@ use shadecast_shaders::light::{Globals, Instance};
 use wgpu::ShaderStages;
 
 use self::{
-    lamps::light_records,
+    lamps::Lamps,
+    light_tree::LightTree,
     materials::material_records,
     texels::Texels,
     trees::{Trees, transforms},
@@ -39,6 +41,8 @@ pub struct GpuScene {
     globals_buffer: wgpu::Buffer,
     instances: Vec<Instance>,
     instance_buffer: wgpu::Buffer,
+    light_tree: LightTree,
+    light_nodes: wgpu::Buffer,
     /// Bytes on the GPU.
     pub bytes: u64,
     /// Times that images were halved to fit.
@@ -60,7 +64,16 @@ impl GpuScene {
         let limit = gpu.device.limits().max_storage_buffer_binding_size;
         let texels = Texels::pack(scene, (limit as f64 * TEXEL_SHARE / 4.0) as usize);
         let materials = material_records(scene, &texels);
-        let (lights, light_weight, sun) = light_records(scene, &materials);
+        let Lamps {
+            mut lights,
+            emitters,
+            punctual_count,
+            sun,
+        } = Lamps::of(scene);
+        let (light_tree, trails) = LightTree::build(emitters);
+        for (light, trail) in lights.iter_mut().zip(trails) {
+            light.trail = trail;
+        }
 
         let corners: Vec<[[f32; 4]; 3]> = scene
             .corners
@@ -109,7 +122,7 @@ impl GpuScene {
             sky_horizon: scene.sky.horizon.to_array(),
             sky_ground: scene.sky.ground.to_array(),
             light_count: lights.len() as u32,
-            light_weight,
+            punctual_count,
             instance_count: trees.instances.len() as u32,
             bounces,
             ..Default::default()
@@ -126,6 +139,7 @@ impl GpuScene {
         gpu.queue
             .write_buffer(&globals_buffer, 0, bytemuck::bytes_of(&globals));
         let instance_buffer = gpu.storage("instances", bytemuck::cast_slice(&trees.instances))?;
+        let light_nodes = gpu.storage("light nodes", bytemuck::cast_slice(&light_tree.nodes))?;
         let lists = [
             gpu.storage("BVH nodes", bytemuck::cast_slice(&trees.nodes))?,
             gpu.storage("BVH triangles", bytemuck::cast_slice(&trees.triangles))?,
@@ -137,9 +151,10 @@ impl GpuScene {
             instance_buffer.clone(),
             gpu.storage("positions", bytemuck::cast_slice(&scene.positions))?,
             gpu.storage("vertices", bytemuck::cast_slice(&vertices))?,
+            light_nodes.clone(),
         ];
         let mut bindings = vec![Binding::Uniform];
-        bindings.extend([Binding::Read; 10]);
+        bindings.extend([Binding::Read; 11]);
         let layout = layout(
             gpu,
             ShaderStages::COMPUTE | ShaderStages::VERTEX | ShaderStages::FRAGMENT,
@@ -157,6 +172,8 @@ impl GpuScene {
             globals_buffer,
             instances: trees.instances,
             instance_buffer,
+            light_tree,
+            light_nodes,
             bytes,
             texture_halvings: texels.halvings,
         })
@@ -187,6 +204,11 @@ impl GpuScene {
             0,
             bytemuck::cast_slice(&self.instances),
         );
+        if self.light_tree.moves() {
+            self.light_tree.refit(poses);
+            let nodes = bytemuck::cast_slice(&self.light_tree.nodes);
+            gpu.queue.write_buffer(&self.light_nodes, 0, nodes);
+        }
     }
 }
 

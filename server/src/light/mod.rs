@@ -1,8 +1,9 @@
 //! Path-traced radiance at the texels of placed patches.
 //!
-//! Radiance lives in object space and linear HDR. A texel's mean grows sample
-//! by sample while its block stands still; what moves to another block is
-//! resampled. Each update has a budget of paths, spent where it is needed most.
+//! Light lives in object space and linear HDR, apart from the surface that it
+//! falls on and from the eye that sees it. A texel's means grow sample by sample
+//! while its block stands still; what moves to another block is resampled. Each
+//! update has a budget of paths, spent where it is needed most.
 //!
 //! Source: SAS 2018, section 3.2; the accumulation and the budget are ours.
 
@@ -27,7 +28,7 @@ use crate::{
 };
 
 pub use paths::{Ends, Paths};
-pub use schedule::{Job, Schedule};
+pub use schedule::{Job, Lasting, Schedule};
 
 /// Most blocks that are lit or moved by one update.
 const MOST_BLOCKS: u64 = 1 << 18;
@@ -36,13 +37,10 @@ const MOST_BLOCKS: u64 = 1 << 18;
 #[derive(Debug)]
 pub struct Light {
     atlas_width: u32,
-    radiance: wgpu::Buffer,
+    texels: Texels,
+    /// As they were before blocks moved; made when a block first moves.
+    texels_before: Option<Texels>,
     shown: wgpu::Buffer,
-    radiance_before: Option<wgpu::Buffer>,
-    surfaces: wgpu::Buffer,
-    surfaces_before: Option<wgpu::Buffer>,
-    crisp: wgpu::Buffer,
-    crisp_before: Option<wgpu::Buffer>,
     parameters: wgpu::Buffer,
     blocks: wgpu::Buffer,
     noise: wgpu::Buffer,
@@ -60,14 +58,36 @@ pub struct Light {
     moves: wgpu::Buffer,
 }
 
+/// What texels remember: see `atlas.wgsl`.
+#[derive(Debug)]
+struct Texels {
+    diffuse: wgpu::Buffer,
+    glossy: wgpu::Buffer,
+    moments: wgpu::Buffer,
+}
+
+impl Texels {
+    fn new(gpu: &Gpu, count: u64) -> Result<Self, GpuError> {
+        Ok(Self {
+            diffuse: gpu.scratch("diffuse light", count * 16)?,
+            glossy: gpu.scratch("glossy light", count * 16)?,
+            moments: gpu.scratch("moments of light", count * 16)?,
+        })
+    }
+
+    fn buffers(&self) -> [&wgpu::Buffer; 3] {
+        [&self.diffuse, &self.glossy, &self.moments]
+    }
+}
+
 impl Light {
     /// An atlas of `size` texels, all unlit.
     ///
     /// # Errors
     /// When the atlas is larger than the device binds.
     pub fn new(gpu: &Gpu, gpu_scene: &GpuScene, size: [u16; 2]) -> Result<Self, GpuError> {
-        let texels = u64::from(size[0]) * u64::from(size[1]);
-        let most_blocks = MOST_BLOCKS.min(texels / 4).max(1);
+        let texel_count = u64::from(size[0]) * u64::from(size[1]);
+        let most_blocks = MOST_BLOCKS.min(texel_count / 4).max(1);
         let own_layout = layout(
             gpu,
             ShaderStages::COMPUTE,
@@ -82,10 +102,8 @@ impl Light {
                 Binding::Write,
             ],
         );
-        let radiance = gpu.scratch("radiance", texels * 16)?;
-        let shown = gpu.scratch("shown", texels * 16)?;
-        let surfaces = gpu.scratch("surfaces", texels * 16)?;
-        let crisp = gpu.scratch("crisp", texels * 16)?;
+        let texels = Texels::new(gpu, texel_count)?;
+        let shown = gpu.scratch("shown", texel_count * 16)?;
         let cells = gpu.scratch("cells", u64::from(CELL_COUNT) * 16)?;
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
         let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
@@ -96,15 +114,15 @@ impl Light {
             &[
                 &parameters,
                 &blocks,
-                &radiance,
-                &surfaces,
+                &texels.diffuse,
+                &texels.glossy,
                 &noise,
                 &shown,
-                &crisp,
+                &texels.moments,
                 &cells,
             ],
         );
-        let paths = Paths::new(gpu, gpu_scene, texels as u32)?;
+        let paths = Paths::new(gpu, gpu_scene, texel_count as u32)?;
         let layouts = [&gpu_scene.layout, &paths.layout, &own_layout];
         let pipeline =
             |entry| gpu.compute_pipeline(ATLAS_SOURCE, entry, &layouts, &gpu_scene.constants);
@@ -116,9 +134,9 @@ impl Light {
                 Binding::Read,
                 Binding::Read,
                 Binding::Read,
-                Binding::Write,
-                Binding::Write,
                 Binding::Read,
+                Binding::Write,
+                Binding::Write,
                 Binding::Write,
             ],
         );
@@ -134,13 +152,9 @@ impl Light {
             carry_layout,
             carry_parameters: gpu.uniform("carry parameters", size_of::<CarryParameters>()),
             moves: gpu.scratch("moves", most_blocks * size_of::<Move>() as u64)?,
-            radiance,
+            texels,
+            texels_before: None,
             shown,
-            radiance_before: None,
-            surfaces,
-            surfaces_before: None,
-            crisp,
-            crisp_before: None,
             parameters,
             blocks,
             noise_readback: gpu.readback("noise", most_blocks * 4),
@@ -175,26 +189,20 @@ impl Light {
         }
         moves.truncate((self.moves.size() / size_of::<Move>() as u64) as usize);
         let carries = moves.iter().any(|m| m.origin != NO_BLOCK);
-        if carries && self.radiance_before.is_none() {
-            let bytes = self.radiance.size();
-            self.radiance_before = Some(gpu.scratch("radiance before", bytes)?);
-            self.surfaces_before = Some(gpu.scratch("surfaces before", bytes)?);
-            self.crisp_before = Some(gpu.scratch("crisp before", bytes)?);
-        }
-        let copies = [
-            (&self.radiance, &self.radiance_before),
-            (&self.surfaces, &self.surfaces_before),
-            (&self.crisp, &self.crisp_before),
-        ];
-        for (from, to) in copies {
-            if let (true, Some(to)) = (carries, to) {
+        if carries {
+            let before = match self.texels_before.take() {
+                Some(before) => before,
+                None => Texels::new(gpu, self.texels.diffuse.size() / 16)?,
+            };
+            for (from, to) in self.texels.buffers().into_iter().zip(before.buffers()) {
                 encoder.copy_buffer_to_buffer(from, 0, to, 0, None);
             }
+            self.texels_before = Some(before);
         }
         if placed.reset {
-            encoder.clear_buffer(&self.radiance, 0, None);
-            encoder.clear_buffer(&self.surfaces, 0, None);
-            encoder.clear_buffer(&self.crisp, 0, None);
+            for buffer in self.texels.buffers() {
+                encoder.clear_buffer(buffer, 0, None);
+            }
             encoder.clear_buffer(&self.shown, 0, None);
         }
         if moves.is_empty() {
@@ -210,19 +218,15 @@ impl Light {
         gpu.queue
             .write_buffer(&self.carry_parameters, 0, bytemuck::bytes_of(&parameters));
         // Without anything to carry the copies are never read: any buffer will do.
+        let before = match &self.texels_before {
+            Some(before) => before.buffers(),
+            None => [&self.blocks; 3],
+        };
+        let now = self.texels.buffers();
         let group = bind(
             gpu,
             &self.carry_layout,
-            &[
-                &self.carry_parameters,
-                &self.moves,
-                self.radiance_before.as_ref().unwrap_or(&self.blocks),
-                self.surfaces_before.as_ref().unwrap_or(&self.blocks),
-                &self.radiance,
-                &self.surfaces,
-                self.crisp_before.as_ref().unwrap_or(&self.blocks),
-                &self.crisp,
-            ],
+            &[&[&self.carry_parameters, &self.moves], &before[..], &now].concat(),
         );
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&self.carry);
@@ -293,11 +297,11 @@ impl Light {
             pass.set_bind_group(2, &self.group, &[]);
             pass.set_pipeline(&self.fade);
             pass.dispatch_workgroups(CELL_COUNT * 4 / 64, 1, 1);
-            pass.set_pipeline(&self.measure);
-            pass.dispatch_workgroups((records.len() as u32).div_ceil(64), 1, 1);
             pass.set_pipeline(&self.smooth);
             let (x, y) = workgroups(records.len() as u32, 1);
             pass.dispatch_workgroups(x, y, 1);
+            pass.set_pipeline(&self.measure);
+            pass.dispatch_workgroups((records.len() as u32).div_ceil(64), 1, 1);
         }
         if lit == 0 {
             gpu.queue.submit([encoder.finish()]);

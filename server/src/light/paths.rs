@@ -88,6 +88,12 @@ impl Paths {
         })
     }
 
+    /// Most paths in flight.
+    #[must_use]
+    pub fn longest_wave(&self) -> u32 {
+        self.longest_wave
+    }
+
     /// Follows `count` paths from their start to their end, and submits the work.
     pub fn follow(&self, gpu: &Gpu, gpu_scene: &GpuScene, ends: Ends<'_>, count: u32) {
         // A camera's ray comes before the first vertex; each vertex has rays of its own.

@@ -5,6 +5,7 @@
 //! by four, and so on, so that a first look never waits. What is left goes
 //! where a path removes most visible error: many pixels, much noise, few samples.
 
+use glam::Vec3;
 use shadecast_protocol::{Block, PatchId, PatchShape};
 use shadecast_shaders::light::BlockRecord;
 
@@ -29,6 +30,9 @@ pub struct Job {
     sample_index: u32,
     log2_stride: u32,
     longest_history: f32,
+    /// Unit vector from the patch to the eye, in the space of its object.
+    view: Vec3,
+    glossy_keep: f32,
 }
 
 impl Job {
@@ -63,7 +67,7 @@ impl Job {
             sample_index: self.sample_index,
             patch_id: self.patch.0,
             longest_history: self.longest_history,
-            padding: 0,
+            glossy_keep: self.glossy_keep,
         }
     }
 }
@@ -77,23 +81,48 @@ struct Lit {
     worth: f32,
     /// Measured standard error, relative.
     noise: f32,
+    /// From where it was seen when it was lit last, as in [`Job`].
+    view: Vec3,
+}
+
+/// How long what is known of a patch's light stays true.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lasting {
+    /// Samples over which means run at most.
+    pub longest_history: f32,
+    /// A point of the patch, in the space of its object.
+    pub point: Vec3,
+    /// GGX alpha of its glossiest part: the half width of the lobe, radians.
+    pub alpha: f32,
+}
+
+impl Lasting {
+    /// What glossy samples are still worth when the patch is seen from `now`
+    /// instead of `then`, unit vectors: a mirror turns what it shows by twice the
+    /// angle of the eye, and half a lobe's width of turning halves their worth.
+    fn glossy_keep(&self, then: Vec3, now: Vec3) -> f32 {
+        /// Below this half width a lobe is a mirror to a texel of its size.
+        const MIRROR: f32 = 0.02;
+        let turned = 2.0 * now.distance(then) / self.alpha.max(MIRROR);
+        1.0 / (1.0 + turned * turned)
+    }
 }
 
 /// Chooses jobs and remembers what came of them.
 #[derive(Clone, Debug)]
 pub struct Schedule {
     lit: Vec<Lit>,
-    /// By patch: the longest history that its material allows.
-    longest_history: Vec<f32>,
+    /// By patch.
+    lasting: Vec<Lasting>,
 }
 
 impl Schedule {
-    /// Nothing is lit yet; `longest_history` by patch.
+    /// Nothing is lit yet; `lasting` by patch.
     #[must_use]
-    pub fn new(longest_history: Vec<f32>) -> Self {
+    pub fn new(lasting: Vec<Lasting>) -> Self {
         Self {
-            lit: vec![Lit::default(); longest_history.len()],
-            longest_history,
+            lit: vec![Lit::default(); lasting.len()],
+            lasting,
         }
     }
 
@@ -107,10 +136,13 @@ impl Schedule {
         }
     }
 
-    /// The job of lighting each texel of a patch's block once.
+    /// The job of lighting each texel of a patch's block once; `eyes[n]` is the
+    /// eye in the space of `ObjectId(n)`.
     #[must_use]
-    pub fn job(&self, patches: &[Patch], id: PatchId, block: Block) -> Job {
+    pub fn job(&self, patches: &[Patch], id: PatchId, block: Block, eyes: &[Vec3]) -> Job {
         let patch = &patches[id.0 as usize];
+        let lasting = &self.lasting[id.0 as usize];
+        let view = (eyes[usize::from(patch.object.0)] - lasting.point).normalize_or_zero();
         Job {
             patch: id,
             block,
@@ -119,7 +151,9 @@ impl Schedule {
             instance: u32::from(patch.object.0),
             sample_index: self.lit[id.0 as usize].drawn,
             log2_stride: 0,
-            longest_history: self.longest_history[id.0 as usize],
+            longest_history: lasting.longest_history,
+            view,
+            glossy_keep: lasting.glossy_keep(self.lit[id.0 as usize].view, view),
         }
     }
 
@@ -131,12 +165,13 @@ impl Schedule {
         patches: &[Patch],
         placed: impl Iterator<Item = (PatchId, Block, u32)>,
         budget: u32,
+        eyes: &[Vec3],
     ) -> Vec<Job> {
         let mut first_looks = Vec::new();
         let mut others: Vec<(f32, Job)> = Vec::new();
         for (id, block, pixels) in placed {
             let lit = self.lit[id.0 as usize];
-            let job = self.job(patches, id, block);
+            let job = self.job(patches, id, block, eyes);
             if lit.worth <= 0.0 {
                 first_looks.push(job);
                 continue;
@@ -201,6 +236,7 @@ impl Schedule {
             let weight = 0.25_f32.powi(job.log2_stride as i32);
             lit.worth = lit.worth.min(job.longest_history) + weight;
             lit.noise = if noise.is_finite() { noise } else { 0.0 };
+            lit.view = job.view;
         }
     }
 }
@@ -209,6 +245,12 @@ impl Schedule {
 mod tests {
     use super::*;
     use shadecast_protocol::{Level, ObjectId};
+
+    const MATTE: Lasting = Lasting {
+        longest_history: 1e4,
+        point: Vec3::Z,
+        alpha: 1.0,
+    };
 
     fn patches(count: u32) -> Vec<Patch> {
         (0..count)
@@ -240,9 +282,9 @@ mod tests {
 
     #[test]
     fn every_block_gets_a_first_look_whatever_the_budget() {
-        let schedule = Schedule::new(vec![1e4; 50]);
+        let schedule = Schedule::new(vec![MATTE; 50]);
         for (budget, paths) in [(u32::MAX, 64), (50 * 16, 16), (50 * 5, 4), (0, 1)] {
-            let jobs = schedule.choose(&patches(50), placed(50), budget);
+            let jobs = schedule.choose(&patches(50), placed(50), budget, &[Vec3::ZERO]);
             assert_eq!(jobs.len(), 50);
             assert!(
                 jobs.iter().all(|job| job.paths() == paths),
@@ -253,23 +295,42 @@ mod tests {
 
     #[test]
     fn paths_go_where_the_noise_is() {
-        let mut schedule = Schedule::new(vec![1e4; 3]);
-        let first = schedule.choose(&patches(3), placed(3), u32::MAX);
+        let mut schedule = Schedule::new(vec![MATTE; 3]);
+        let first = schedule.choose(&patches(3), placed(3), u32::MAX, &[Vec3::ZERO]);
         for _ in 0..20 {
             schedule.traced(&first, &[0.01, 0.5, 0.01]);
         }
-        let next = schedule.choose(&patches(3), placed(3), 64);
+        let next = schedule.choose(&patches(3), placed(3), 64, &[Vec3::ZERO]);
         assert_eq!(next.len(), 1);
         assert_eq!(next[0].patch, PatchId(1));
     }
 
     #[test]
+    fn glossy_light_is_kept_while_the_eye_stays_within_its_lobe() {
+        let keep = |alpha, angle: f32| {
+            let now = Vec3::new(angle.sin(), 0.0, angle.cos());
+            Lasting { alpha, ..MATTE }.glossy_keep(Vec3::Z, now)
+        };
+        assert_eq!(keep(0.0, 0.0), 1.0);
+        assert!(keep(1.0, 0.1) > 0.95, "rough surfaces hardly change");
+        assert!((keep(0.1, 0.05) - 0.5).abs() < 0.01, "half a lobe's width");
+        assert!(keep(0.0, 0.1) < 0.02, "a mirror shows something else");
+        // A patch at the eye, and one that was never lit, have no direction.
+        let nowhere = Lasting {
+            alpha: 0.5,
+            ..MATTE
+        }
+        .glossy_keep(Vec3::ZERO, Vec3::Z);
+        assert!((0.0..0.1).contains(&nowhere));
+    }
+
+    #[test]
     fn a_block_that_lost_its_content_is_a_first_look_again() {
-        let mut schedule = Schedule::new(vec![1e4; 2]);
-        let first = schedule.choose(&patches(2), placed(2), u32::MAX);
+        let mut schedule = Schedule::new(vec![MATTE; 2]);
+        let first = schedule.choose(&patches(2), placed(2), u32::MAX, &[Vec3::ZERO]);
         schedule.traced(&first, &[f32::NAN, 0.1]);
         schedule.placed(PatchId(1), false, false);
-        let next = schedule.choose(&patches(2), placed(2), 0);
+        let next = schedule.choose(&patches(2), placed(2), 0, &[Vec3::ZERO]);
         assert_eq!(
             next.iter().map(|job| job.patch).collect::<Vec<_>>(),
             [PatchId(1)]

@@ -12,6 +12,7 @@ use crate::{
 };
 
 const ATLAS: u16 = 64;
+const EYE: Vec3 = Vec3::new(0.5, 0.5, 2.0);
 
 /// A square that glows in four colours, one a quarter.
 fn four_quarters() -> PatchedScene {
@@ -104,7 +105,11 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
     let gpu = Gpu::open().expect("a GPU");
     let gpu_scene = GpuScene::new(&gpu, &scene.scene, 1, &mut |_| ()).expect("a scene");
     let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2]).expect("an atlas");
-    let schedule = Schedule::new(vec![64.0]);
+    let schedule = Schedule::new(vec![Lasting {
+        longest_history: 64.0,
+        point: Vec3::ZERO,
+        alpha: 1.0,
+    }]);
     let bytes = light.shown().size();
     let readback = gpu.readback("shown", bytes);
 
@@ -123,10 +128,10 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
             .expect("room");
         gpu.queue.submit([encoder.finish()]);
         // Only the first block is traced; the others are resampled from it.
-        let job = [schedule.job(&scene.patches, PatchId(0), block)];
+        let job = [schedule.job(&scene.patches, PatchId(0), block, &[EYE])];
         let jobs = if old.is_none() { &job[..] } else { &[] };
         light
-            .trace(&gpu, &gpu_scene, jobs, &job, Vec3::new(0.5, 0.5, 2.0))
+            .trace(&gpu, &gpu_scene, jobs, &job, EYE)
             .expect("light");
         let mut encoder = (gpu.device).create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(light.shown(), 0, &readback, 0, bytes);

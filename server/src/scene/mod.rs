@@ -15,7 +15,7 @@ mod tangents;
 use std::time::Duration;
 
 use glam::{Affine2, Vec2, Vec3, Vec4};
-use shadecast_protocol::{ObjectId, Pose};
+use shadecast_protocol::{Motion, ObjectId, Pose};
 
 pub use courtyard::courtyard;
 pub use export::write_glb;
@@ -339,14 +339,40 @@ impl RigidObject {
     /// Where the object is at `time` since the scene began.
     #[must_use]
     pub fn world_from_object(&self, time: Duration) -> Pose {
-        let (Some(first), Some(last)) = (self.keys.first(), self.keys.last()) else {
+        self.pose_in_loop(self.time_in_loop(time))
+    }
+
+    /// The same with its velocities, which are means over a tenth of a second:
+    /// long enough that poses far from the origin do not round them away. Where
+    /// the animation begins anew, the object jumps and its velocity does not.
+    #[must_use]
+    pub fn motion(&self, time: Duration) -> Motion {
+        const HALF_SPAN: Duration = Duration::from_millis(50);
+        let time = self.time_in_loop(time);
+        let before = time.saturating_sub(HALF_SPAN);
+        let after = (time + HALF_SPAN).min(self.length());
+        let ends = [before, after].map(|time| self.pose_in_loop(time));
+        let seconds = after.saturating_sub(before).as_secs_f32();
+        Motion::along(self.pose_in_loop(time), ends, seconds)
+    }
+
+    fn length(&self) -> Duration {
+        self.keys.last().map_or(Duration::ZERO, |last| last.0)
+    }
+
+    fn time_in_loop(&self, time: Duration) -> Duration {
+        let length = self.length().as_nanos();
+        Duration::from_nanos(time.as_nanos().checked_rem(length).unwrap_or(0) as u64)
+    }
+
+    /// `time` is at most the length.
+    fn pose_in_loop(&self, time: Duration) -> Pose {
+        let Some(first) = self.keys.first() else {
             return Pose::IDENTITY;
         };
-        let length = last.0;
-        if length.is_zero() {
+        if self.length().is_zero() {
             return first.1;
         }
-        let time = Duration::from_nanos((time.as_nanos() % length.as_nanos()) as u64);
         let next = self
             .keys
             .partition_point(|key| key.0 <= time)
@@ -362,5 +388,40 @@ impl RigidObject {
             position: before.1.position.lerp(after.1.position, t),
             orientation: before.1.orientation.slerp(after.1.orientation, t),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+
+    use super::*;
+
+    #[test]
+    fn an_object_jumps_where_its_animation_begins_anew_but_its_velocity_does_not() {
+        // Far from the origin, and not a loop: 3 m at 2 m/s, then back at once.
+        let at = |x: f32| Pose {
+            position: Vec3::new(1e5 + x, 0.0, 0.0),
+            orientation: Quat::IDENTITY,
+        };
+        let object = RigidObject {
+            name: String::new(),
+            keys: vec![
+                (Duration::ZERO, at(0.0)),
+                (Duration::from_millis(1500), at(3.0)),
+            ],
+        };
+        for milliseconds in [0, 20, 700, 1499, 1500, 1510, 100_000] {
+            let motion = object.motion(Duration::from_millis(milliseconds));
+            let off = (motion.linear_velocity - Vec3::X * 2.0).length();
+            assert!(off < 0.35, "{motion:?} after {milliseconds} ms");
+            assert_eq!(motion.angular_velocity, Vec3::ZERO);
+        }
+        let nothing = RigidObject {
+            name: String::new(),
+            keys: Vec::new(),
+        };
+        let still = Motion::still(Pose::IDENTITY);
+        assert_eq!(nothing.motion(Duration::from_secs(7)), still);
     }
 }

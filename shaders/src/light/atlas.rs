@@ -36,10 +36,10 @@ pub struct BlockRecord {
     pub sample_index: u32,
     /// Seeds the sampler.
     pub patch_id: u32,
-    /// Samples over which the mean runs at most.
+    /// Samples over which means run at most.
     pub longest_history: f32,
-    /// Zero.
-    pub padding: u32,
+    /// What old glossy samples are still worth, seen from where the eye is now.
+    pub glossy_keep: f32,
 }
 
 /// A point of a patch by one of its triangles.

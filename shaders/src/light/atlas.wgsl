@@ -1,9 +1,15 @@
 // Begins paths at texels of placed patches, and accumulates what they bring.
 // One thread per job; jobs of a block are consecutive, `blocks` is ascending
-// in `first_job`. Reads the scene and `blocks`; updates `radiance` (mean and
-// weight), `crisp` (the part of it that is free of noise) and `surfaces` (mean
-// base colour, and of the squared luminance of the rest).
-// Twin of the mapping: patch_point.rs. Source: SAS 2018, section 3.2; figure 6.
+// in `first_job`. Reads the scene and `blocks`; updates what a texel remembers:
+// - `diffuse`: mean light by the diffuse lobe over the diffuse colour, without
+//   the sun's, and its samples. It does not depend on the eye.
+// - `glossy`: mean light by the specular lobe, without the sun's, and its
+//   samples, which lose their worth as the eye moves.
+// - `moments`: share of the sun that is seen; mean squared luminance of diffuse
+//   and of glossy samples.
+// Textures, normal maps, emission and the sun's reflection are not in there:
+// `smooth_blocks` adds them exactly, however few paths have come.
+// Twin of the mapping: atlas.rs. Source: SAS 2018, section 3.2; figure 6.
 
 struct LightParameters {
     eye: vec3<f32>,
@@ -22,19 +28,19 @@ struct BlockRecord {
     first_triangle: u32,
     sample_index: u32,
     patch_id: u32,
-    // Samples over which the mean runs at most.
+    // Samples over which means run at most.
     longest_history: f32,
-    padding: u32,
+    // What old glossy samples are still worth, seen from where the eye is now.
+    glossy_keep: f32,
 }
 
 @group(2) @binding(0) var<uniform> parameters: LightParameters;
 @group(2) @binding(1) var<storage, read> blocks: array<BlockRecord>;
-@group(2) @binding(2) var<storage, read_write> radiance: array<vec4<f32>>;
-@group(2) @binding(3) var<storage, read_write> surfaces: array<vec4<f32>>;
+@group(2) @binding(2) var<storage, read_write> diffuse: array<vec4<f32>>;
+@group(2) @binding(3) var<storage, read_write> glossy: array<vec4<f32>>;
+@group(2) @binding(6) var<storage, read_write> moments: array<vec4<f32>>;
 
-@group(2) @binding(6) var<storage, read_write> crisp: array<vec4<f32>>;
-
-// Samples over which the mean runs where a moving object was met.
+// Samples over which means run where a moving object was met.
 const MOVING_HISTORY: f32 = 6.0;
 
 const TURNED: u32 = 1u << 14u;
@@ -112,26 +118,16 @@ fn job_at(index: u32) -> Job {
     return job;
 }
 
-@compute @workgroup_size(64)
-fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let path = id.x + id.y * groups.x * 64u;
-    if (path >= wave.path_count) {
-        return;
-    }
-    let job = job_at(wave.first_job + path);
-    let seed = hash(hash(job.block.patch_id * 0x9e3779b9u + parameters.seed) ^ (job.corner.x << 16u | job.corner.y));
-    var rng = Sampler(job.block.sample_index, seed, 0u);
-    let extent = vec2<f32>(job.size - 1u);
-    let middle = vec2<f32>(job.corner) + 0.5 * f32(job.stride - 1u);
-    // Jitter inside the texel; what would leave the patch is reflected back in.
-    var p = (middle + (sample_2d(&rng) - 0.5) * f32(job.stride)) / extent;
-    p = 1.0 - abs(1.0 - abs(p));
-    // Kept off the very edge, where two walls of a corner meet.
-    p = mix(vec2<f32>(0.02) / extent, 1.0 - vec2<f32>(0.02) / extent, clamp(p, vec2<f32>(0.0), vec2<f32>(1.0)));
+// A block's surface at `p`, from 0 to 1 along its sides, as the eye sees it.
+struct Seen {
+    surface: Surface,
+    wo: vec3<f32>,
+}
 
-    let instance = job.block.layout_bits >> 16u;
-    let point = block_point(job.block.layout_bits, p);
-    let triangle = job.block.first_triangle + point.triangle;
+fn seen_surface(block: BlockRecord, p: vec2<f32>, size: vec2<u32>, stride: u32) -> Seen {
+    let instance = block.layout_bits >> 16u;
+    let point = block_point(block.layout_bits, p);
+    let triangle = block.first_triangle + point.triangle;
     let p0 = vertex_position(triangle, 0u);
     let e1 = vertex_position(triangle, 1u) - p0;
     let e2 = vertex_position(triangle, 2u) - p0;
@@ -149,19 +145,36 @@ fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     if (materials[triangles[triangle].w & MATERIAL_MASK].double_sided == 0u && dot(wo, n) < 0.001) {
         wo = normalize(wo + n * (0.001 - dot(wo, n)));
     }
-    let texels_of_triangle = max(extent.x * extent.y, 1.0) * 0.5;
-    let width = sqrt(0.5 * length(doubled) / texels_of_triangle) * f32(job.stride);
-    let surface = surface_at(triangle, point.b, wo, width);
+    let texels_of_triangle = max(f32(size.x - 1u) * f32(size.y - 1u), 1.0) * 0.5;
+    let width = sqrt(0.5 * length(doubled) / texels_of_triangle) * f32(stride);
+    return Seen(surface_at(triangle, point.b, wo, width), wo);
+}
+
+@compute @workgroup_size(64)
+fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let path = id.x + id.y * groups.x * 64u;
+    if (path >= wave.path_count) {
+        return;
+    }
+    let job = job_at(wave.first_job + path);
+    let seed = hash(hash(job.block.patch_id * 0x9e3779b9u + parameters.seed) ^ (job.corner.x << 16u | job.corner.y));
+    var rng = Sampler(job.block.sample_index, seed, 0u);
+    let extent = vec2<f32>(job.size - 1u);
+    let middle = vec2<f32>(job.corner) + 0.5 * f32(job.stride - 1u);
+    // Jitter inside the texel; what would leave the patch is reflected back in.
+    var p = (middle + (sample_2d(&rng) - 0.5) * f32(job.stride)) / extent;
+    p = 1.0 - abs(1.0 - abs(p));
+    // Kept off the very edge, where two walls of a corner meet.
+    p = mix(vec2<f32>(0.02) / extent, 1.0 - vec2<f32>(0.02) / extent, clamp(p, vec2<f32>(0.0), vec2<f32>(1.0)));
+
+    let seen = seen_surface(job.block, p, job.size, job.stride);
     var state: PathState;
     state.throughput = vec3<f32>(1.0);
-    state.radiance = surface.emissive;
     state.seed = seed;
     state.sample_index = job.block.sample_index;
-    state.progress = 1u;
-    state.albedo = surface.base;
-    state.crisp = surface.emissive;
-    state.cell = cell_around(surface.position, surface.ng, sample_2d(&rng) - 0.5);
-    leave_vertex(path, surface, wo, 0u, 0u, state);
+    state.progress = 1u | LOBES_APART;
+    state.cell = cell_around(seen.surface.position, seen.surface.ng, sample_2d(&rng) - 0.5);
+    leave_vertex(path, seen.surface, seen.wo, 0u, 0u, state);
 }
 
 @compute @workgroup_size(64)
@@ -171,27 +184,32 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
         return;
     }
     let job = job_at(wave.first_job + path);
-    let found = radiance_of(path);
+    let state = paths[path];
     // A coarse look is one sample, shared by the texels that it lights.
     let weight_of_sample = 1.0 / f32(job.stride * job.stride);
-    let sharp = min(paths[path].crisp, found);
-    let rest = found - sharp;
-    add_to_cell(paths[path].cell, rest / max(paths[path].albedo, vec3<f32>(DARKEST)));
+    let indirect = sound(state.radiance);
+    let found_diffuse = sound(state.direct_diffuse + state.onward_diffuse * indirect);
+    let found_glossy = sound(state.direct_glossy + state.onward_glossy * indirect);
+    add_to_cell(state.cell, found_diffuse);
     var longest = job.block.longest_history;
-    if ((paths[path].progress & NEAR_MOVER) != 0u) {
+    if ((state.progress & NEAR_MOVER) != 0u) {
         longest = min(longest, MOVING_HISTORY);
     }
-    let square = luminance(rest) * luminance(rest);
+    let of_diffuse = luminance(found_diffuse);
+    let of_glossy = luminance(found_glossy);
+    let found = vec4<f32>(select(0.0, 1.0, (state.progress & SUNLIT) != 0u),
+        of_diffuse * of_diffuse, of_glossy * of_glossy, 0.0);
     for (var y = 0u; y < min(job.stride, job.size.y - job.corner.y); y++) {
         for (var x = 0u; x < min(job.stride, job.size.x - job.corner.x); x++) {
             let at = ((job.block.position >> 16u) + job.corner.y + y) * parameters.atlas_width
                 + (job.block.position & 0xffffu) + job.corner.x + x;
-            let old = radiance[at];
-            let history = min(old.w, longest);
+            let history = min(diffuse[at].w, longest);
             let share = weight_of_sample / (history + weight_of_sample);
-            radiance[at] = vec4<f32>(mix(old.rgb, found, share), history + weight_of_sample);
-            crisp[at] = mix(crisp[at], vec4<f32>(sharp, 0.0), share);
-            surfaces[at] = mix(surfaces[at], vec4<f32>(paths[path].albedo, square), share);
+            diffuse[at] = vec4<f32>(mix(diffuse[at].rgb, found_diffuse, share), history + weight_of_sample);
+            let glossy_history = min(glossy[at].w * job.block.glossy_keep, longest);
+            let glossy_share = weight_of_sample / (glossy_history + weight_of_sample);
+            glossy[at] = vec4<f32>(mix(glossy[at].rgb, found_glossy, glossy_share), glossy_history + weight_of_sample);
+            moments[at] = mix(moments[at], found, vec4<f32>(share, share, glossy_share, 0.0));
         }
     }
 }

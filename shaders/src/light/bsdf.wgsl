@@ -72,18 +72,28 @@ fn specular_share(s: Surface, cos_o: f32) -> f32 {
     return clamp(specular / max(specular + diffuse, 1e-6), 0.1, select(0.9, 1.0, s.metallic > 0.999));
 }
 
+// The BSDF times the cosine, lobe by lobe.
 struct BsdfValue {
-    // BSDF times the cosine.
-    f: vec3<f32>,
+    // To be multiplied by `diffuse_color`.
+    diffuse: f32,
+    specular: vec3<f32>,
     // Density of `sample_bsdf` in solid angle.
     pdf: f32,
+}
+
+fn diffuse_color(s: Surface) -> vec3<f32> {
+    return s.base * (1.0 - s.metallic);
+}
+
+fn both_lobes(s: Surface, value: BsdfValue) -> vec3<f32> {
+    return diffuse_color(s) * value.diffuse + value.specular;
 }
 
 fn evaluate_bsdf(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfValue {
     let cos_i = dot(s.ns, wi);
     let cos_o = dot(s.ns, wo);
     if (cos_i <= 0.0 || cos_o <= 0.0 || dot(s.ng, wi) <= 0.0) {
-        return BsdfValue(vec3<f32>(0.0), 0.0);
+        return BsdfValue(0.0, vec3<f32>(0.0), 0.0);
     }
     let h = normalize(wo + wi);
     let cos_h = clamp(dot(s.ns, h), 0.0, 1.0);
@@ -91,12 +101,12 @@ fn evaluate_bsdf(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfValue {
     let d = ggx_d(cos_h, s.alpha);
     let specular = d * ggx_v(cos_o, cos_i, s.alpha);
     let dielectric_f = s.f0 + (1.0 - s.f0) * fresnel;
-    let dielectric = mix(s.base / PI, vec3<f32>(specular), dielectric_f);
-    let metal = specular * (s.base + (1.0 - s.base) * fresnel);
+    let metal_f = s.base + (1.0 - s.base) * fresnel;
     let share = specular_share(s, cos_o);
     let pdf_specular = d * ggx_g1(cos_o, s.alpha) / (4.0 * cos_o);
     return BsdfValue(
-        mix(dielectric, metal, s.metallic) * cos_i,
+        (1.0 - dielectric_f) * cos_i / PI,
+        mix(vec3<f32>(dielectric_f), metal_f, s.metallic) * specular * cos_i,
         mix(cos_i / PI, pdf_specular, share),
     );
 }

@@ -16,8 +16,6 @@ const CELL_UNIT: f32 = 1024.0;
 const BRIGHTEST: f32 = 64.0;
 // Each update forgets this share of what the cells hold.
 const FORGETTING: u32 = 24u;
-// Base colour below which dividing by it would only amplify noise.
-const DARKEST: f32 = 0.02;
 
 fn cell_around(position: vec3<f32>, n: vec3<f32>, jitter: vec2<f32>) -> u32 {
     let distance = max(length(position - parameters.eye), 1e-6);

@@ -12,7 +12,8 @@ pub use carry::{CarryParameters, Move, NO_BLOCK};
 pub use path::{HIT_BYTES, RAY_BYTES, STATE_BYTES, Wave};
 pub use sampler::Sampler;
 pub use scene::{
-    Globals, Instance, LightRecord, Material, NO_TEXTURE, TextureRecord, rows_of_affine,
+    Globals, Instance, LIGHT_LEAF, LightNode, LightRecord, Material, NO_TEXTURE, TextureRecord,
+    rows_of_affine,
 };
 pub use still::StillParameters;
 
@@ -24,6 +25,7 @@ macro_rules! path_source {
             include_str!("trace.wgsl"),
             include_str!("sampler.wgsl"),
             include_str!("bsdf.wgsl"),
+            include_str!("lights.wgsl"),
             include_str!("path.wgsl"),
             $(include_str!($entry)),*
         )

@@ -1,6 +1,7 @@
-// How noisy each block just lit still is, as it will be seen.
-// One thread per block; reads `radiance`, `crisp` and `surfaces`, writes `noise`: the
-// mean over the block of the standard error relative to the tone curve's scale.
+// How noisy each block just lit still is, as it is seen.
+// One thread per block; reads what its texels remember and what is shown of them,
+// writes `noise`: the mean over the block of the standard error relative to the
+// tone curve's scale.
 
 @group(2) @binding(4) var<storage, read_write> noise: array<f32>;
 
@@ -20,10 +21,13 @@ fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
     for (var y = 0u; y < size.y; y += step.y) {
         for (var x = 0u; x < size.x; x += step.x) {
             let at = ((block.position >> 16u) + y) * parameters.atlas_width + (block.position & 0xffffu) + x;
-            let mean = luminance(radiance[at].rgb);
-            let rest = mean - luminance(crisp[at].rgb);
-            let variance = max(surfaces[at].w - rest * rest, 0.0) / max(radiance[at].w, 1.0);
-            sum += sqrt(variance) / (mean + 0.2);
+            let mean = vec2<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb));
+            let samples = max(vec2<f32>(diffuse[at].w, glossy[at].w), vec2<f32>(1.0));
+            let error = sqrt(max(moments[at].yz - mean * mean, vec2<f32>(0.0)) / samples);
+            // What is shown of the diffuse light tells the colour that it falls on.
+            let seen = luminance(shown[at].rgb);
+            let color = min(seen / max(mean.x + mean.y, 1e-6), 1.0);
+            sum += (error.x * color + error.y) / (seen + 0.2);
             count += 1.0;
         }
     }

@@ -21,4 +21,4 @@ pub const RAY_BYTES: u64 = 3 * 32;
 /// Bytes of their hits.
 pub const HIT_BYTES: u64 = 3 * 16;
 /// Bytes of a path's state.
-pub const STATE_BYTES: u64 = 112;
+pub const STATE_BYTES: u64 = 128;

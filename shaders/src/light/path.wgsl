@@ -9,27 +9,43 @@
 // by a shadow ray.
 
 struct PathState {
+    // From the first vertex on, where its lobes are kept apart; else from the camera.
     throughput: vec3<f32>,
     // Density of the ray onwards; zero where the emission it meets counts in full.
     pdf: f32,
+    // What came in over the ray onwards from the first vertex, or into the camera.
     radiance: vec3<f32>,
-    // Vertex in the lower half; NEAR_MOVER.
+    // Vertex in the lower half; NEAR_MOVER, LOBES_APART and SUNLIT.
     progress: u32,
-    // What the shadow rays bring if nothing is in their way.
+    // What the shadow rays bring if nothing is in their way; where the lobes
+    // are kept apart, `light` by the specular one.
     sun: vec3<f32>,
     seed: u32,
     light: vec3<f32>,
     sample_index: u32,
+    // The remaining ones hold where the lobes of the first vertex are kept apart.
+    // Direct light by the diffuse lobe, over the diffuse colour.
+    direct_diffuse: vec3<f32>,
     // Width of the sample per metre of the ray onwards.
     cone: f32,
-    // Of the first vertex.
-    albedo: vec3<f32>,
-    // Where its light is shared with its surroundings.
+    // Direct light by the specular lobe.
+    direct_glossy: vec3<f32>,
+    // What `radiance` counts by the diffuse lobe, over the diffuse colour.
+    onward_diffuse: f32,
+    // What it counts by the specular lobe.
+    onward_glossy: vec3<f32>,
+    // Where the diffuse light is shared with its surroundings.
     cell: u32,
-    // What needs no smoothing: emission, and the sun at the first vertex.
-    crisp: vec3<f32>,
+    // Of the surface that the ray onwards leaves.
+    normal: vec3<f32>,
     padding: u32,
 }
+
+// The first vertex is a texel's, whose lobes have histories of their own. Its
+// sun is only looked for: how bright it makes the texel needs no path.
+const LOBES_APART: u32 = 0x40000000u;
+// The sun shines on the first vertex.
+const SUNLIT: u32 = 0x20000000u;
 
 @group(1) @binding(2) var<storage, read_write> paths: array<PathState>;
 
@@ -41,156 +57,8 @@ const PAIRS_AT_START: u32 = 2u;
 // Dimension pairs that one vertex may draw.
 const PAIRS_PER_VERTEX: u32 = 8u;
 
-// Candidates drawn from the lamps by power, before one light is chosen.
-const LAMP_CANDIDATES: u32 = 2u;
-const INFINITE: f32 = 3.0e38;
 // Share of the faintest contributions that still get a shadow ray.
 const LEAST_SURVIVAL: f32 = 0.1;
-
-struct LightSample {
-    direction: vec3<f32>,
-    distance: f32,
-    // Unshadowed contribution, divided by its density.
-    value: vec3<f32>,
-}
-
-fn sample_cone(axis: vec3<f32>, cos_max: f32, u: vec2<f32>) -> vec3<f32> {
-    let cosine = 1.0 - u.x * (1.0 - cos_max);
-    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
-    let phi = 2.0 * PI * u.y;
-    return normalize(to_world(frame_around(axis), vec3<f32>(cos(phi) * sine, sin(phi) * sine, cosine)));
-}
-
-fn sun_sample(s: Surface, wo: vec3<f32>, u: vec2<f32>) -> LightSample {
-    let wi = sample_cone(globals.sun_direction, globals.sun_cos, u);
-    return LightSample(wi, INFINITE, evaluate_bsdf(s, wo, wi).f * globals.sun_irradiance);
-}
-
-// glTF's recommended windowing of the inverse square.
-fn attenuation(distance: f32, range: f32) -> f32 {
-    let q = distance / range;
-    let window = clamp(1.0 - q * q * q * q, 0.0, 1.0);
-    return window / max(distance * distance, 1e-8);
-}
-
-// One of the lamps, by power. With `with_bsdf_rays`, emissive triangles are
-// also met by BSDF samples and the two share by the balance heuristic.
-fn lamp_sample(s: Surface, wo: vec3<f32>, u_choice: f32, u: vec2<f32>, with_bsdf_rays: bool) -> LightSample {
-    var low = 0u;
-    var high = globals.light_count - 1u;
-    while (low < high) {
-        let middle = (low + high) / 2u;
-        if (lights[middle].cumulative > u_choice) {
-            high = middle;
-        } else {
-            low = middle + 1u;
-        }
-    }
-    let light = lights[low];
-    var none = LightSample(vec3<f32>(0.0), 0.0, vec3<f32>(0.0));
-    if (light.kind == 3u) {
-        return LightSample(-light.direction, INFINITE,
-            evaluate_bsdf(s, wo, -light.direction).f * light.intensity / light.probability);
-    }
-    if (light.kind != 0u) {
-        let to_light = light.position - s.position;
-        let distance = length(to_light);
-        if (distance < 1e-6) {
-            return none;
-        }
-        let wi = to_light / distance;
-        var strength = attenuation(distance, light.range) / light.probability;
-        if (light.kind == 2u) {
-            let t = clamp((dot(-wi, light.direction) - light.cos_outer)
-                / max(light.cos_inner - light.cos_outer, 1e-4), 0.0, 1.0);
-            strength *= t * t;
-        }
-        return LightSample(wi, distance, evaluate_bsdf(s, wo, wi).f * light.intensity * strength);
-    }
-    // A point on the triangle, uniform by area.
-    let root = sqrt(u.x);
-    let b = vec2<f32>(root * (1.0 - u.y), root * u.y);
-    let p0 = vertex_position(light.triangle, 0u);
-    let e1 = vertex_position(light.triangle, 1u) - p0;
-    let e2 = vertex_position(light.triangle, 2u) - p0;
-    var p = p0 + e1 * b.x + e2 * b.y;
-    var n = normalize(cross(e1, e2));
-    if (HAS_MOVERS && light.instance != 0u) {
-        p = transform_point(instances[light.instance].world_from_object, p);
-        n = transform_vector(instances[light.instance].world_from_object, n);
-    }
-    let to_light = p - s.position;
-    let distance = length(to_light);
-    if (distance < 1e-6) {
-        return none;
-    }
-    let wi = to_light / distance;
-    let record = triangles[light.triangle];
-    let material = materials[record.w & MATERIAL_MASK];
-    var cosine = -dot(n, wi);
-    cosine = select(cosine, abs(cosine), material.double_sided != 0u);
-    if (cosine <= 1e-6) {
-        return none;
-    }
-    var emission = material.emissive;
-    if (HAS_TEXTURES && material.textures[3].offset != NONE) {
-        let uv = corners[record.x * 3u + 2u] * (1.0 - b.x - b.y)
-            + corners[record.y * 3u + 2u] * b.x + corners[record.z * 3u + 2u] * b.y;
-        emission *= texture_at(material.textures[3], uv.xy, uv.zw, 0.0).rgb;
-    }
-    let pdf = light.probability / light.area * distance * distance / cosine;
-    let bsdf = evaluate_bsdf(s, wo, wi);
-    var value = bsdf.f * emission / pdf;
-    if (with_bsdf_rays) {
-        value *= pdf / (pdf + bsdf.pdf);
-    }
-    return LightSample(wi, distance, value);
-}
-
-// Adds a candidate to a reservoir of one.
-fn consider(chosen: ptr<function, LightSample>, total: ptr<function, f32>, u: ptr<function, f32>, next: LightSample) {
-    let weight = luminance(next.value);
-    if (weight <= 0.0) {
-        return;
-    }
-    *total += weight;
-    let p = weight / *total;
-    if (*u < p) {
-        *chosen = next;
-        *u = *u / p;
-    } else {
-        *u = (*u - p) / (1.0 - p);
-    }
-    *u = clamp(*u, 0.0, 0.99999994);
-}
-
-fn light_sample(s: Surface, wo: vec3<f32>, last: bool, rng: ptr<function, Sampler>) -> LightSample {
-    var chosen = LightSample(vec3<f32>(0.0), 0.0, vec3<f32>(0.0));
-    var total = 0.0;
-    let choice = sample_2d(rng);
-    var u = choice.x;
-    if (HAS_SKY && last) {
-        let wi = to_world(frame_around(s.ns), cosine_hemisphere(sample_2d(rng)));
-        let cosine = max(dot(s.ns, wi), 1e-6);
-        let value = evaluate_bsdf(s, wo, wi).f * sky_radiance(wi) * (PI / cosine);
-        consider(&chosen, &total, &u, LightSample(wi, INFINITE, value));
-    }
-    if (HAS_LIGHTS) {
-        let point = sample_2d(rng);
-        for (var i = 0u; i < LAMP_CANDIDATES; i++) {
-            let stratum = (f32(i) + choice.y) / f32(LAMP_CANDIDATES);
-            let shifted = fract(point + vec2<f32>(0.7548777, 0.5698403) * f32(i));
-            var lamp = lamp_sample(s, wo, stratum, shifted, !last);
-            lamp.value /= f32(LAMP_CANDIDATES);
-            consider(&chosen, &total, &u, lamp);
-        }
-    }
-    let weight = luminance(chosen.value);
-    if (weight > 0.0) {
-        chosen.value *= total / weight;
-    }
-    return chosen;
-}
 
 // Queues a ray to be traced at `step`; a negative length is none.
 fn send(path: u32, slot: u32, origin: vec3<f32>, direction: vec3<f32>, length: f32, step: u32) {
@@ -209,29 +77,29 @@ fn send_nothing(path: u32, slot: u32) {
 fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, state_in: PathState) {
     var state = state_in;
     let last = vertex >= globals.bounces;
+    let apart = vertex == 0u && (state.progress & LOBES_APART) != 0u;
     var rng = Sampler(state.sample_index, state.seed, PAIRS_AT_START + vertex * PAIRS_PER_VERTEX);
     let origin = offset_origin(s.position, s.ng);
 
-    state.sun = vec3<f32>(0.0);
     if (HAS_SUN) {
         let sun = sun_sample(s, wo, sample_2d(&rng));
-        state.sun = state.throughput * sun.value;
-        send(path, SLOT_SUN, origin, sun.direction, select(-1.0, INFINITE, any(state.sun > vec3<f32>(0.0))), step);
+        state.sun = state.throughput * both_lobes(s, sun.bsdf) * sun.incoming;
+        let shines = select(any(state.sun > vec3<f32>(0.0)), dot(s.ng, sun.direction) > 0.0, apart);
+        send(path, SLOT_SUN, origin, sun.direction, select(-1.0, INFINITE, shines), step);
     } else {
         send_nothing(path, SLOT_SUN);
     }
 
     let light = light_sample(s, wo, last, &rng);
-    state.light = state.throughput * light.value;
     // Russian roulette on what would hardly be seen.
-    let worth = luminance(state.light) / globals.faint;
-    if (worth < 1.0) {
-        let survival = max(worth, LEAST_SURVIVAL);
-        state.light = select(vec3<f32>(0.0), state.light / survival, sample_2d(&rng).x < survival);
-    }
+    let worth = luminance(state.throughput * both_lobes(s, light.bsdf) * light.incoming) / globals.faint;
+    let survival = clamp(worth, LEAST_SURVIVAL, 1.0);
+    let goes = worth > 0.0 && (survival >= 1.0 || sample_2d(&rng).x < survival);
+    let incoming = state.throughput * light.incoming / survival;
+    state.light = incoming * select(both_lobes(s, light.bsdf), light.bsdf.specular, apart);
+    state.direct_diffuse = select(state.direct_diffuse, incoming * light.bsdf.diffuse, apart);
     // Short of the lamp by a few rounding steps.
-    send(path, SLOT_LIGHT, origin, light.direction,
-        select(-1.0, light.distance * 0.9999, any(state.light > vec3<f32>(0.0))), step);
+    send(path, SLOT_LIGHT, origin, light.direction, select(-1.0, light.distance * 0.9999, goes), step);
 
     var onwards = false;
     if (!last) {
@@ -239,8 +107,15 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
         let wi = sample_bsdf(s, wo, u, sample_2d(&rng).x);
         let bsdf = evaluate_bsdf(s, wo, wi);
         onwards = any(wi != vec3<f32>(0.0)) && bsdf.pdf > 0.0;
-        state.throughput *= select(vec3<f32>(0.0), bsdf.f / bsdf.pdf, onwards);
+        let per_density = select(0.0, 1.0 / bsdf.pdf, onwards);
+        if (apart) {
+            state.onward_diffuse = bsdf.diffuse * per_density;
+            state.onward_glossy = bsdf.specular * per_density;
+        } else {
+            state.throughput *= both_lobes(s, bsdf) * per_density;
+        }
         state.pdf = bsdf.pdf;
+        state.normal = s.ns;
         // The next hit is looked at as widely as this lobe spreads.
         state.cone = max(state.cone, s.alpha);
         send(path, SLOT_ONWARDS, origin, wi, select(-1.0, INFINITE, onwards), step);
@@ -268,13 +143,16 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
         return;
     }
     var state = paths[path];
+    let apart = (state.progress & (LOBES_APART | 0xffffu)) == (LOBES_APART | 1u);
     if (HAS_SUN && is_unshadowed(path, SLOT_SUN, &state)) {
-        state.radiance += state.sun;
-        if ((state.progress & 0xffffu) == 1u) {
-            state.crisp += state.sun;
-        }
+        state.radiance += select(state.sun, vec3<f32>(0.0), apart);
+        state.progress |= select(0u, SUNLIT, apart);
     }
-    if (is_unshadowed(path, SLOT_LIGHT, &state)) {
+    let lit = is_unshadowed(path, SLOT_LIGHT, &state);
+    if (apart) {
+        state.direct_glossy = select(vec3<f32>(0.0), state.light, lit);
+        state.direct_diffuse = select(vec3<f32>(0.0), state.direct_diffuse, lit);
+    } else if (lit) {
         state.radiance += state.light;
     }
     let index = SLOT_ONWARDS * wave.path_count + path;
@@ -297,10 +175,10 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     let wo = -ray.direction;
     let s = surface_at(triangle, bitcast<vec2<f32>>(hit.zw), wo, state.cone * t);
     var weight = 1.0;
-    if (HAS_LIGHTS && state.pdf > 0.0 && s.emission_weight > 0.0) {
+    if (HAS_LIGHTS && state.pdf > 0.0 && any(s.emissive > vec3<f32>(0.0))) {
         let cosine = max(abs(dot(s.ng, wo)), 1e-6);
-        let light_pdf = s.emission_weight / globals.light_weight * t * t / cosine;
-        weight = state.pdf / (state.pdf + light_pdf);
+        let chosen = lamp_density(triangle, ray.origin, state.normal);
+        weight = state.pdf / (state.pdf + chosen * t * t / cosine);
     }
     state.radiance += state.throughput * s.emissive * weight;
     let vertex = state.progress & 0xffffu;
@@ -308,9 +186,8 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     leave_vertex(path, s, wo, vertex, wave.step + 1u, state);
 }
 
-// What a finished path brings; nothing where arithmetic failed.
-fn radiance_of(path: u32) -> vec3<f32> {
-    let result = paths[path].radiance;
-    let finite = all(result < vec3<f32>(INFINITE)) && all(result >= vec3<f32>(0.0));
-    return select(vec3<f32>(0.0), result, finite);
+// Nothing where arithmetic failed.
+fn sound(light: vec3<f32>) -> vec3<f32> {
+    let finite = all(light < vec3<f32>(INFINITE)) && all(light >= vec3<f32>(0.0));
+    return select(vec3<f32>(0.0), light, finite);
 }

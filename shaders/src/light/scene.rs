@@ -16,8 +16,8 @@ pub struct Globals {
     pub light_count: u32,
     /// Radiance at eye level.
     pub sky_horizon: [f32; 3],
-    /// Sum of the weights of all lights.
-    pub light_weight: f32,
+    /// Of those, how many are no triangles; the others ascend by triangle.
+    pub punctual_count: u32,
     /// Radiance from below.
     pub sky_ground: [f32; 3],
     /// Length of the list of instances.
@@ -92,8 +92,8 @@ pub struct Material {
     pub f0: f32,
     /// 1 where seen from both sides.
     pub double_sided: u32,
-    /// Luminance of the mean emission.
-    pub emission_weight: f32,
+    /// Zero.
+    pub spare: f32,
     /// Zero.
     pub padding: [f32; 2],
     /// Base colour, metallic-roughness, normal, emissive.
@@ -110,12 +110,12 @@ pub struct LightRecord {
     pub triangle: u32,
     /// What an emissive triangle moves with.
     pub instance: u32,
-    /// Probability of this light or one before it.
-    pub cumulative: f32,
+    /// Bit `n` says which child of the light node at depth `n` leads to it.
+    pub trail: u32,
     /// Metres.
     pub position: [f32; 3],
-    /// With which it is a candidate.
-    pub probability: f32,
+    /// Zero.
+    pub padding: u32,
     /// W/sr, or W/m² of a directional light.
     pub intensity: [f32; 3],
     /// Metres.
@@ -129,7 +129,30 @@ pub struct LightRecord {
     /// Of an emissive triangle, m².
     pub area: f32,
     /// Zero.
-    pub padding: [f32; 2],
+    pub spare: [f32; 2],
+}
+
+/// Marks a [`LightNode`]'s child as a light.
+pub const LIGHT_LEAF: u32 = 0x8000_0000;
+
+/// A node of the tree over the lamps: a sphere and a cone of directions about them.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct LightNode {
+    /// Metres, in the world.
+    pub centre: [f32; 3],
+    /// Metres; negative where the lamps are infinitely far.
+    pub radius: f32,
+    /// Middle of the directions that they shine to.
+    pub axis: [f32; 3],
+    /// Of the angle about the axis beyond which no surface's normal lies.
+    pub cos_spread: f32,
+    /// Sum of their greatest intensities.
+    pub power: f32,
+    /// The first of two, or [`LIGHT_LEAF`] and the light.
+    pub child: u32,
+    /// Zero.
+    pub padding: [u32; 2],
 }
 
 /// The world, or a moving object.

@@ -28,7 +28,8 @@ struct Globals {
     sky_zenith: vec3<f32>,
     light_count: u32,
     sky_horizon: vec3<f32>,
-    light_weight: f32,
+    // Of those, how many are no triangles; the others ascend by triangle.
+    punctual_count: u32,
     sky_ground: vec3<f32>,
     instance_count: u32,
     // Unit vector towards the sun and the cosine of its half angle.
@@ -64,8 +65,7 @@ struct Material {
     // Reflectance of the dielectric at normal incidence.
     f0: f32,
     double_sided: u32,
-    // Luminance of the mean emission: the weight of a lamp per square metre.
-    emission_weight: f32,
+    spare: f32,
     padding: vec2<f32>,
     textures: array<TextureRecord, 4>,
 }
@@ -79,17 +79,30 @@ struct LightRecord {
     kind: u32,
     triangle: u32,
     instance: u32,
-    // Sum of the weights up to and including this light, of a total of one.
-    cumulative: f32,
+    // Bit n says which child of the node at depth n leads to it.
+    trail: u32,
     position: vec3<f32>,
-    probability: f32,
+    padding: u32,
     intensity: vec3<f32>,
     range: f32,
     direction: vec3<f32>,
     cos_outer: f32,
     cos_inner: f32,
     area: f32,
-    padding: vec2<f32>,
+    spare: vec2<f32>,
+}
+
+// A node of the tree over the lamps: a sphere and a cone of directions about them.
+struct LightNode {
+    centre: vec3<f32>,
+    // Negative where they are infinitely far.
+    radius: f32,
+    axis: vec3<f32>,
+    cos_spread: f32,
+    power: f32,
+    // The first of two, or LIGHT_LEAF and the light.
+    child: u32,
+    padding: vec2<u32>,
 }
 
 struct Instance {
@@ -115,6 +128,7 @@ struct Instance {
 // Three floats a vertex and three vertices a triangle.
 @group(0) @binding(9) var<storage, read> positions: array<f32>;
 @group(0) @binding(10) var<storage, read> vertices: array<u32>;
+@group(0) @binding(11) var<storage, read> light_nodes: array<LightNode>;
 
 fn transform_point(m: mat3x4<f32>, p: vec3<f32>) -> vec3<f32> {
     return vec4<f32>(p, 1.0) * m;
@@ -197,8 +211,6 @@ struct Surface {
     ns: vec3<f32>,
     base: vec3<f32>,
     emissive: vec3<f32>,
-    // Weight per square metre with which light sampling chooses this emitter.
-    emission_weight: f32,
     metallic: f32,
     // Roughness squared, kept above zero.
     alpha: f32,
@@ -289,7 +301,6 @@ fn surface_at(triangle: u32, b: vec2<f32>, wo: vec3<f32>, width: f32) -> Surface
     let alpha = clamp(roughness, 0.0, 1.0);
     s.alpha = max(alpha * alpha, MIN_ALPHA);
     s.metallic = clamp(s.metallic, 0.0, 1.0);
-    s.emission_weight = material.emission_weight;
     s.f0 = material.f0;
     return s;
 }

@@ -1,11 +1,13 @@
-// Smooths what few samples have lit: the mean over a small window of the block
-// of the radiance divided by the base colour, each neighbour counting by its
-// samples and by how likely the difference is noise; and where even the window
-// holds few samples, the mean of the surroundings in the world. Both fade out as
-// samples come in, so that a still scene converges to what was traced. The sun
-// and emission are free of noise and are left as they are.
-// One workgroup per block; reads `radiance`, `crisp`, `surfaces` and `cells`,
-// writes `shown`.
+// Makes what is shown of blocks that were lit or moved: smooths what few samples
+// have lit, and puts it on the surface.
+//
+// Diffuse and glossy light are each the mean over a small window of the block,
+// each neighbour counting by its samples and by how likely the difference is
+// noise; diffuse light besides the mean of the surroundings in the world, where
+// even the window holds few samples. All fades out as samples come in, so that a
+// still scene converges to what was traced. Colour, normal, emission and the sun's
+// reflection are those of the texel's middle: they are free of noise.
+// One workgroup per block; reads the scene and what texels remember, writes `shown`.
 // Source: Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017,
 // sections 4.1 and 4.4, with one small window instead of a pyramid.
 
@@ -22,35 +24,24 @@ const ASSUMED_NOISE: f32 = 0.8;
 // Samples that the surroundings count for.
 const CELL_WEIGHT: f32 = 6.0;
 
-// Light over base colour, and its variance.
-fn demodulated(at: u32) -> vec4<f32> {
-    let albedo = max(surfaces[at].rgb, vec3<f32>(DARKEST));
-    let samples = radiance[at].w;
-    let rest = max(radiance[at].rgb - crisp[at].rgb, vec3<f32>(0.0));
-    let mean = luminance(rest);
-    let measured = max(surfaces[at].w - mean * mean, 0.0);
+// Variance of a mean of `samples` samples with this mean square.
+fn variance_of(mean: f32, mean_square: f32, samples: f32) -> f32 {
+    let measured = max(mean_square - mean * mean, 0.0);
     let assumed = ASSUMED_NOISE * ASSUMED_NOISE * mean * mean;
-    let of_one = mix(assumed, measured, clamp((samples - 1.0) / 8.0, 0.0, 1.0));
-    let scale = luminance(albedo);
-    return vec4<f32>(rest / albedo, of_one / max(samples, 0.02) / (scale * scale));
+    return mix(assumed, measured, clamp((samples - 1.0) / 8.0, 0.0, 1.0)) / max(samples, 0.02);
 }
 
-// Light around a texel of a block, and how many paths it comes from.
-fn surroundings(block: BlockRecord, p: vec2<i32>, size: vec2<i32>) -> vec4<f32> {
-    let point = block_point(block.layout_bits, vec2<f32>(p) / vec2<f32>(size - 1));
-    let triangle = block.first_triangle + point.triangle;
-    let p0 = vertex_position(triangle, 0u);
-    let e1 = vertex_position(triangle, 1u) - p0;
-    let e2 = vertex_position(triangle, 2u) - p0;
-    var position = p0 + e1 * point.b.x + e2 * point.b.y;
-    var n = normalize(cross(e1, e2));
-    let instance = block.layout_bits >> 16u;
-    if (HAS_MOVERS && instance != 0u) {
-        position = transform_point(instances[instance].world_from_object, position);
-        n = transform_vector(instances[instance].world_from_object, n);
-    }
-    n = select(-n, n, dot(n, parameters.eye - position) >= 0.0);
-    return cell_light(cell_around(position, n, vec2<f32>(0.0)));
+// How much a neighbour counts whose mean differs by `difference`.
+fn likeness(difference: f32, variance: f32) -> f32 {
+    return exp(-difference * difference / (TOLERANCE * TOLERANCE * max(variance, 1e-8)));
+}
+
+// The sun by both lobes, where all of it is seen. A lobe narrower than the sun
+// shows the sun's disc.
+fn sunlight(s_in: Surface, wo: vec3<f32>) -> vec3<f32> {
+    var s = s_in;
+    s.alpha = max(s.alpha, sqrt(max(2.0 - 2.0 * globals.sun_cos, 0.0)));
+    return both_lobes(s, evaluate_bsdf(s, wo, globals.sun_direction)) * globals.sun_irradiance;
 }
 
 @compute @workgroup_size(64)
@@ -67,32 +58,52 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
     for (var i = i32(lane); i < size.x * size.y; i += 64) {
         let p = vec2<i32>(i % size.x, i / size.x);
         let at = u32((corner.y + p.y) * width + corner.x + p.x);
-        let here = radiance[at];
-        if (here.w >= ENOUGH_SAMPLES || here.w <= 0.0) {
-            shown[at] = here;
+        let here = diffuse[at];
+        if (here.w <= 0.0) {
+            shown[at] = vec4<f32>(0.0);
             continue;
         }
-        let centre = demodulated(at);
-        var sum = vec3<f32>(0.0);
-        var weights = 0.0;
-        let low = max(p - RADIUS, vec2<i32>(0));
-        let high = min(p + RADIUS, size - 1);
-        for (var y = low.y; y <= high.y; y++) {
-            for (var x = low.x; x <= high.x; x++) {
-                let near = u32((corner.y + y) * width + corner.x + x);
-                let other = demodulated(near);
-                let difference = luminance(other.rgb) - luminance(centre.rgb);
-                let noise = max(centre.w + other.w, 1e-8);
-                let weight = radiance[near].w * exp(-difference * difference / (TOLERANCE * TOLERANCE * noise));
-                sum += other.rgb * weight;
-                weights += weight;
+        let seen = seen_surface(block, vec2<f32>(p) / vec2<f32>(size - 1), vec2<u32>(size), 1u);
+        let s = seen.surface;
+        let shiny = glossy[at];
+        var diffuse_light = here.rgb;
+        var glossy_light = shiny.rgb;
+        if (min(here.w, shiny.w) < ENOUGH_SAMPLES) {
+            let mean = vec2<f32>(luminance(here.rgb), luminance(shiny.rgb));
+            let variance = vec2<f32>(variance_of(mean.x, moments[at].y, here.w),
+                variance_of(mean.y, moments[at].z, shiny.w));
+            var sum = vec3<f32>(0.0);
+            var sum_glossy = vec3<f32>(0.0);
+            var weights = vec2<f32>(0.0);
+            let low = max(p - RADIUS, vec2<i32>(0));
+            let high = min(p + RADIUS, size - 1);
+            for (var y = low.y; y <= high.y; y++) {
+                for (var x = low.x; x <= high.x; x++) {
+                    let near = u32((corner.y + y) * width + corner.x + x);
+                    let other = diffuse[near];
+                    let other_glossy = glossy[near];
+                    let other_mean = vec2<f32>(luminance(other.rgb), luminance(other_glossy.rgb));
+                    let weight = vec2<f32>(
+                        other.w * likeness(other_mean.x - mean.x,
+                            variance.x + variance_of(other_mean.x, moments[near].y, other.w)),
+                        other_glossy.w * likeness(other_mean.y - mean.y,
+                            variance.y + variance_of(other_mean.y, moments[near].z, other_glossy.w)));
+                    sum += other.rgb * weight.x;
+                    sum_glossy += other_glossy.rgb * weight.y;
+                    weights += weight;
+                }
             }
+            let around = cell_light(cell_around(s.position, s.ng, vec2<f32>(0.0)));
+            let trust = CELL_WEIGHT * clamp(around.w / 16.0, 0.0, 1.0);
+            let smoothed = (sum + around.rgb * trust) / max(weights.x + trust, 1e-6);
+            let smoothed_glossy = sum_glossy / max(weights.y, 1e-6);
+            diffuse_light = mix(smoothed, here.rgb, min(here.w / ENOUGH_SAMPLES, 1.0));
+            glossy_light = mix(smoothed_glossy, shiny.rgb, min(shiny.w / ENOUGH_SAMPLES, 1.0));
         }
-        let around = surroundings(block, p, size);
-        let trust = CELL_WEIGHT * clamp(around.w / 16.0, 0.0, 1.0);
-        let albedo = max(surfaces[at].rgb, vec3<f32>(DARKEST));
-        let light = (sum + around.rgb * trust) / max(weights + trust, 1e-6);
-        let smoothed = crisp[at].rgb + light * albedo;
-        shown[at] = vec4<f32>(mix(smoothed, here.rgb, here.w / ENOUGH_SAMPLES), here.w);
+        var light = s.emissive + diffuse_color(s) * diffuse_light + glossy_light;
+        if (HAS_SUN) {
+            light += moments[at].x * sunlight(s, seen.wo);
+        }
+        shown[at] = vec4<f32>(sound(light), here.w);
     }
 }

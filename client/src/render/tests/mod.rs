@@ -11,7 +11,7 @@ mod view;
 use std::sync::Arc;
 
 use glam::{Quat, Vec2, Vec3};
-use shadecast_protocol::{Epoch, EyeView, Fov, FrameId, Pose, UpdateTiming};
+use shadecast_protocol::{Epoch, EyeView, Fov, FrameId, Motion, Pose, UpdateTiming};
 
 use super::{EyeCamera, EyeImages, Gpu, Pixels, Readback, Renderer, RendererConfig, Stereo};
 use crate::{ClientFrame, ClientTiming, DrawVertex, YuvPicture};
@@ -39,6 +39,7 @@ struct Bench {
     gpu: Gpu,
     renderer: Renderer,
     eyes: EyeImages,
+    seconds_of_motion: f32,
 }
 
 impl Bench {
@@ -59,6 +60,7 @@ impl Bench {
             gpu,
             renderer,
             eyes,
+            seconds_of_motion: 0.0,
         }
     }
 
@@ -70,7 +72,8 @@ impl Bench {
 
     fn draw(&self, cameras: [EyeCamera; 2]) -> [Pixels; 2] {
         let mut encoder = self.encoder();
-        self.renderer.draw(&mut encoder, cameras, &self.eyes);
+        self.renderer
+            .draw(&mut encoder, cameras, self.seconds_of_motion, &self.eyes);
         let copies = [0, 1]
             .map(|eye| Readback::record(&self.gpu.device, &mut encoder, self.eyes.texture(), eye));
         self.gpu.queue.submit([encoder.finish()]);
@@ -184,7 +187,8 @@ impl Geometry {
             vertices: Arc::new(self.vertices),
             opaque_indices: self.indices.len() as u32,
             indices: Arc::new(self.indices),
-            transforms: Arc::new(vec![Pose::IDENTITY]),
+            objects_lead: 0,
+            motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),
             picture: Arc::new(picture),
             masks: None,
             patches: 1,

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_PI_2;
 use std::sync::Arc;
 
 use glam::{Quat, Vec2, Vec3};
-use shadecast_protocol::{Pose, Sky};
+use shadecast_protocol::{Motion, Pose, Sky};
 
 use super::*;
 
@@ -125,15 +125,26 @@ fn an_object_is_drawn_where_it_has_moved_to() {
     let mut frame = Geometry::default()
         .quad(Vec3::ZERO, 0.5, 1, red)
         .frame(four_colors());
-    frame.transforms = Arc::new(vec![Pose::IDENTITY, at(Vec3::new(1.0, 0.0, -2.0))]);
+    let still = |x| Motion::still(at(Vec3::new(x, 0.0, -2.0)));
+    frame.motions = Arc::new(vec![still(0.0), still(1.0)]);
     let mut bench = Bench::with_frame(&frame);
     assert_eq!(
         bench.look(Pose::IDENTITY).columns_in_row(32),
         Some((40, 55))
     );
-    frame.transforms = Arc::new(vec![Pose::IDENTITY, at(Vec3::new(-1.0, 0.0, -2.0))]);
+    let moving = Motion {
+        linear_velocity: Vec3::X,
+        ..still(-1.0)
+    };
+    frame.motions = Arc::new(vec![still(0.0), moving]);
     bench.renderer.upload(&frame).expect("a sound frame");
     assert_eq!(bench.look(Pose::IDENTITY).columns_in_row(32), Some((8, 23)));
+    // Two seconds later it is where it was first.
+    bench.seconds_of_motion = 2.0;
+    assert_eq!(
+        bench.look(Pose::IDENTITY).columns_in_row(32),
+        Some((40, 55))
+    );
 }
 
 #[test]

@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
-    Block, Epoch, FrameId, Level, ObjectId, PatchGeometry, PatchId, PatchShape, Picture, Placement,
-    Pose, ToClient, Update, UpdateTiming, Vertex, VertexId,
+    Block, Epoch, FrameId, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Picture,
+    Placement, Pose, ToClient, Update, UpdateTiming, Vertex, VertexId,
 };
 
 use super::{YuvPicture, presented};
@@ -25,7 +25,7 @@ pub(super) struct Server {
     next: u32,
     epoch: u32,
     starts_epoch: bool,
-    /// Sends all geometry and transforms again at a reset.
+    /// Sends all geometry and motions again at a reset.
     pub(super) repeats: bool,
 }
 
@@ -75,6 +75,7 @@ impl Server {
             timing: UpdateTiming::default(),
             world_from_head: Pose::IDENTITY,
             scene_time: u64::from(number),
+            objects_lead: 0,
             vertices: (first_new..=number).flat_map(vertices).collect(),
             patches: (first_new..=number).map(patch).collect(),
             removals: match number.checked_sub(PLACED) {
@@ -83,7 +84,7 @@ impl Server {
             },
             placements: placed.map(placement).collect(),
             masks: vec![],
-            transforms: transforms(number, idr && self.repeats),
+            motions: motions(number, idr && self.repeats),
         };
         let picture = Picture {
             frame: update.frame,
@@ -111,7 +112,7 @@ impl Server {
             assert_eq!(shown.picture, truth.picture);
             assert_eq!(shown.vertices, truth.vertices);
             assert_eq!(shown.indices, truth.indices);
-            assert_eq!(shown.transforms, truth.transforms);
+            assert_eq!(shown.motions, truth.motions);
             assert_eq!(shown.epoch, truth.epoch);
             assert_eq!(shown.scene_time, truth.scene_time);
         }
@@ -168,14 +169,14 @@ fn placement(number: u32) -> Placement {
 }
 
 /// The object moves at every third frame.
-fn transforms(number: u32, repeat: bool) -> Vec<(ObjectId, Pose)> {
+fn motions(number: u32, repeat: bool) -> Vec<(ObjectId, Motion)> {
     let last_move = number - number % 3;
     let pose = Pose {
         position: Vec3::splat(last_move as f32),
         orientation: Quat::IDENTITY,
     };
     if repeat || number == last_move {
-        vec![(ObjectId(1), pose)]
+        vec![(ObjectId(1), Motion::still(pose))]
     } else {
         vec![]
     }

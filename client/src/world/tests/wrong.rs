@@ -10,7 +10,7 @@ fn a_wrong_update_is_named_and_changes_nothing() {
         patches: vec![patch(6, PatchShape::Solo)],
         removals: vec![PatchId(1)],
         placements: vec![placement(6, 32, 0, [1, 1])],
-        transforms: vec![(ObjectId(1), Pose::IDENTITY)],
+        motions: vec![(ObjectId(1), Motion::still(Pose::IDENTITY))],
         ..update(1)
     };
     let wrong = |change: fn(&mut Update)| {
@@ -94,7 +94,10 @@ fn a_wrong_update_is_named_and_changes_nothing() {
             order("masks"),
         ),
         (
-            wrong(|u| u.transforms.push((ObjectId::WORLD, Pose::IDENTITY))),
+            wrong(|u| {
+                u.motions
+                    .push((ObjectId::WORLD, Motion::still(Pose::IDENTITY)))
+            }),
             WorldError::WorldMoved,
         ),
     ];

@@ -9,6 +9,19 @@ use super::{
 };
 use crate::scene::{Alpha, Scene, TextureRef, Wrap};
 
+/// Luminance of the mean emission, by material.
+pub(super) fn mean_emissions(scene: &Scene) -> Vec<f32> {
+    let mean = |texture: Option<TextureRef>| {
+        texture.map_or(Vec3::ONE, |texture| {
+            mean_color(&scene.images[texture.image as usize])
+        })
+    };
+    let materials = scene.materials.iter();
+    materials
+        .map(|material| luminance(material.emissive * mean(material.emissive_texture)))
+        .collect()
+}
+
 pub(super) fn material_records(scene: &Scene, texels: &Texels) -> Vec<MaterialRecord> {
     let wrap = |wrap: Wrap| match wrap {
         Wrap::Repeat => 0,
@@ -40,9 +53,6 @@ pub(super) fn material_records(scene: &Scene, texels: &Texels) -> Vec<MaterialRe
         .iter()
         .map(|material| {
             let textures = slots(material);
-            let mean = material.emissive_texture.map_or(Vec3::ONE, |texture| {
-                mean_color(&scene.images[texture.image as usize])
-            });
             let reflectance = ((material.ior - 1.0) / (material.ior + 1.0)).powi(2);
             MaterialRecord {
                 base_color: material.base_color.to_array(),
@@ -56,7 +66,7 @@ pub(super) fn material_records(scene: &Scene, texels: &Texels) -> Vec<MaterialRe
                 },
                 f0: reflectance,
                 double_sided: u32::from(material.double_sided),
-                emission_weight: luminance(material.emissive * mean),
+                spare: 0.0,
                 padding: [0.0; 2],
                 textures: std::array::from_fn(|slot| record(slot, textures[slot])),
             }
