@@ -3,7 +3,7 @@
 
 use anyhow::{Result, bail};
 use shadecast_client::render::Gpu;
-use shadecast_protocol::ClientTime;
+use shadecast_protocol::{ClientTime, Motion};
 
 use crate::args::Args;
 use crate::capture::Capture;
@@ -42,7 +42,11 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     loop {
         clock.sleep_until(display.next_tick());
         let display_at = display.begin(clock.now());
-        let head = trace.at(seconds(began, display_at));
+        // The head waits for the first picture, so that runs can be compared.
+        let head = match headset.measured.first_picture {
+            Some(first) => trace.at(seconds(first, display_at)),
+            None => Motion::still(trace.at(0.0).pose),
+        };
         let turn = headset.turn(display_at, head, |encoder| {
             if let Some(panel) = &panel {
                 panel.draw(encoder);

@@ -1,8 +1,9 @@
 //! What the command line says.
 
-use std::{net::SocketAddr, path::PathBuf};
+use std::{ffi::OsString, net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
+use glam::Vec3;
 
 /// Name of the built-in scene.
 pub(crate) const BUILT_IN: &str = "courtyard";
@@ -15,6 +16,7 @@ pub(crate) const BUILT_IN: &str = "courtyard";
 Examples:
   shadecast serve courtyard            serve the built-in scene; start a client with the line it prints
   shadecast serve castle.glb --atlas 4096 --bitrate 40
+  shadecast render castle.glb --out castle.exr --spp 256
   shadecast inspect castle.glb         what is in a scene, and what it lets the server leave out
   shadecast scene courtyard --out courtyard.glb --triangles 250000"
 )]
@@ -27,6 +29,8 @@ pub(crate) struct Cli {
 pub(crate) enum Command {
     /// Serve a scene to a headset
     Serve(ServeArguments),
+    /// Render a still picture by the server's own light
+    Render(RenderArguments),
     /// Write the built-in scene as a binary glTF file
     Scene {
         /// Which scene: courtyard
@@ -56,6 +60,68 @@ pub(crate) struct SceneArguments {
     /// About how many triangles the built-in scene has
     #[arg(long, default_value_t = 15_000, value_parser = triangles)]
     pub(crate) triangles: usize,
+}
+
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  shadecast render courtyard --out courtyard.png
+  shadecast render castle.glb --out castle.exr --seconds 60 --bounces 4 --fovy 75
+  shadecast render plane.glb --out plane.exr --env const:1,1,1 --view 1,0,0,0,0,1,0,0,0,0,1,-3,0,0,0,1
+
+Lists of numbers are separated by commas or spaces. Spaces are right-handed, a camera
+looks along -Z and +Y is up.")]
+pub(crate) struct RenderArguments {
+    #[command(flatten)]
+    pub(crate) scene: SceneArguments,
+    /// FILE.exr for linear Rec.709 radiance in 32-bit floats, and FILE.png beside it; or FILE.png alone
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: PathBuf,
+    /// World-to-camera matrix, 16 numbers row by row [default: the scene's camera or spawn]
+    #[arg(long, value_name = "NUMBERS", value_parser = numbers::<16>, allow_hyphen_values = true)]
+    pub(crate) view: Option<[f64; 16]>,
+    /// Angle from the lower to the upper side of the picture, degrees
+    #[arg(long, value_name = "DEGREES", default_value_t = 60.0, value_parser = field_of_view)]
+    pub(crate) fovy: f64,
+    /// Tangents of the left, right, lower and upper sides instead; left and down are mostly negative
+    #[arg(long, value_name = "L,R,D,U", value_parser = numbers::<4>, allow_hyphen_values = true, conflicts_with = "fovy")]
+    pub(crate) tangents: Option<[f64; 4]>,
+    /// Width in pixels
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=8192))]
+    pub(crate) width: u32,
+    /// Height in pixels
+    #[arg(long, default_value_t = 512, value_parser = clap::value_parser!(u32).range(1..=8192))]
+    pub(crate) height: u32,
+    /// Samples a pixel
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    pub(crate) spp: u32,
+    /// Render for this long instead of a number of samples
+    #[arg(long, value_parser = positive, conflicts_with = "spp")]
+    pub(crate) seconds: Option<f64>,
+    /// Indirect bounces; 0 is emission and direct light only
+    #[arg(long, default_value_t = shadecast_server::still::DEFAULT_BOUNCES, value_parser = clap::value_parser!(u32).range(0..=64))]
+    pub(crate) bounces: u32,
+    /// Seed of all random choices: the same seed on the same driver gives the same picture
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u32,
+    /// Light from all around instead of the scene's sky: none, or const:R,G,B (radiance)
+    #[arg(long, value_parser = environment)]
+    pub(crate) env: Option<Environment>,
+    /// A sun instead of the scene's directional lights: the direction that it shines along, and its irradiance
+    #[arg(long, value_name = "DX,DY,DZ,R,G,B", value_parser = sun, allow_hyphen_values = true)]
+    pub(crate) sun: Option<[f64; 6]>,
+    /// Factor from radiance to the brightness of the PNG [default: measured in the picture]
+    #[arg(long, value_parser = positive)]
+    pub(crate) exposure: Option<f64>,
+}
+
+/// What lights a scene from all around.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Environment {
+    /// Nothing.
+    None,
+    /// The same radiance everywhere.
+    Constant(Vec3),
 }
 
 #[derive(Debug, Args)]
@@ -100,6 +166,96 @@ pub(crate) struct ServeArguments {
     pub(crate) stats: Option<PathBuf>,
 }
 
+/// Options that take a list of numbers.
+const LISTS: [&str; 3] = ["--view", "--tangents", "--sun"];
+
+/// The command line with each list of numbers as one argument, however it was
+/// written: `--sun -1,-2,0 5 5 5` becomes `--sun=-1,-2,0,5,5,5`.
+pub(crate) fn joined_lists(arguments: impl Iterator<Item = OsString>) -> Vec<OsString> {
+    let is_list = |text: &str| {
+        let mut parts = text.split([',', ' ']).filter(|part| !part.is_empty());
+        parts.all(|part| part.parse::<f64>().is_ok())
+    };
+    let mut joined: Vec<OsString> = Vec::new();
+    let mut open = false;
+    for argument in arguments {
+        let text = argument.to_str().unwrap_or_default();
+        if open && is_list(text) {
+            if let Some(list) = joined.last_mut() {
+                list.push(
+                    if list
+                        .to_string_lossy()
+                        .ends_with(|c: char| c.is_ascii_alphabetic())
+                    {
+                        "="
+                    } else {
+                        ","
+                    },
+                );
+                list.push(text);
+            }
+            continue;
+        }
+        open = LISTS.contains(&text);
+        joined.push(argument);
+    }
+    joined
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let parts = text.split([',', ' ']).filter(|part| !part.is_empty());
+    let found: Vec<f64> = parts
+        .map(|part| match part.parse::<f64>() {
+            Ok(number) if number.is_finite() => Ok(number),
+            _ => Err(format!("\"{part}\" is no finite number")),
+        })
+        .collect::<Result<_, _>>()?;
+    let count = found.len();
+    found
+        .try_into()
+        .map_err(|_| format!("{N} numbers are expected, there are {count}"))
+}
+
+fn environment(text: &str) -> Result<Environment, String> {
+    if text == "none" {
+        return Ok(Environment::None);
+    }
+    let Some(radiance) = text.strip_prefix("const:") else {
+        return Err("none or const:R,G,B is expected".to_owned());
+    };
+    let radiance = numbers::<3>(radiance)?;
+    if radiance
+        .iter()
+        .any(|channel| !(0.0..=1e6).contains(channel))
+    {
+        return Err("radiance from 0 to 1e6 is expected".to_owned());
+    }
+    Ok(Environment::Constant(Vec3::from(
+        radiance.map(|channel| channel as f32),
+    )))
+}
+
+fn sun(text: &str) -> Result<[f64; 6], String> {
+    let sun = numbers::<6>(text)?;
+    if sun[..3].iter().all(|part| part.abs() < 1e-12) {
+        return Err("the direction is zero".to_owned());
+    }
+    if sun[3..]
+        .iter()
+        .any(|channel| !(0.0..=1e9).contains(channel))
+    {
+        return Err("irradiance from 0 to 1e9 is expected".to_owned());
+    }
+    Ok(sun)
+}
+
+fn field_of_view(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(degrees) if degrees > 0.1 && degrees < 179.0 => Ok(degrees),
+        _ => Err("an angle from 0.1 to 179 degrees is expected".to_owned()),
+    }
+}
+
 fn triangles(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count @ 1_000..=8_000_000) => Ok(count),
@@ -126,5 +282,63 @@ fn positive(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(number) if number.is_finite() && number > 0.0 && number < 1e6 => Ok(number),
         _ => Err("a positive number below a million is expected".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn render(arguments: &str) -> Result<RenderArguments, clap::Error> {
+        let words = ["shadecast", "render", "courtyard", "--out", "a.png"].into_iter();
+        let words = words.chain(arguments.split(' ').filter(|word| !word.is_empty()));
+        let cli = Cli::try_parse_from(joined_lists(words.map(OsString::from)))?;
+        match cli.command {
+            Command::Render(arguments) => Ok(arguments),
+            other => panic!("{other:?}"),
+        }
+    }
+
+    #[test]
+    fn lists_of_numbers_may_be_written_in_any_way() {
+        for list in [
+            "-1,-2,0,5,6,7",
+            "-1 -2 0 5 6 7",
+            "-1,-2,0 5,6,7",
+            "-1, -2, 0, 5, 6, 7",
+        ] {
+            let found = render(&format!("--sun {list} --spp 3")).unwrap();
+            assert_eq!(found.sun, Some([-1.0, -2.0, 0.0, 5.0, 6.0, 7.0]), "{list}");
+            assert_eq!(found.spp, 3);
+        }
+        let found = render("--tangents=-1,1,-0.5,0.5").unwrap();
+        assert_eq!(found.tangents, Some([-1.0, 1.0, -0.5, 0.5]));
+        let found = render("--env const:1,0.5,0").unwrap();
+        assert_eq!(
+            found.env,
+            Some(Environment::Constant(Vec3::new(1.0, 0.5, 0.0)))
+        );
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused() {
+        for arguments in [
+            "--view 1,0,0",
+            "--sun 0,0,0,1,1,1",
+            "--sun 0,-1,0,1,1,nan",
+            "--sun 0,-1,0,-1,1,1",
+            "--env const:1,1",
+            "--env const:-1,1,1",
+            "--env sky",
+            "--fovy 180",
+            "--fovy nan",
+            "--spp 0",
+            "--width 0",
+            "--bounces 65",
+            "--seconds 1 --spp 2",
+            "--fovy 60 --tangents -1,1,-1,1",
+        ] {
+            assert!(render(arguments).is_err(), "{arguments}");
+        }
     }
 }

@@ -27,7 +27,7 @@ const LONGEST_HISTORY: f32 = 4096.0;
 const MOVING_HISTORY: f32 = 8.0;
 /// Texels asked for per pixel and axis. More than one, because bilinear lookup
 /// blurs by about a texel and the outer half texels of a block lie beyond its patch.
-const TEXELS_PER_PIXEL: f32 = 1.12;
+const TEXELS_PER_PIXEL: f32 = 1.0;
 
 /// What a frame is made for.
 #[derive(Clone, Debug)]

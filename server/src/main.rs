@@ -1,6 +1,8 @@
-//! The `shadecast` command: serve a scene, write the built-in one, or look at one.
+//! The `shadecast` command: serve a scene, render it, write the built-in one,
+//! or tell what is in one.
 
 mod cli;
+mod render;
 mod serve;
 mod status;
 
@@ -19,7 +21,7 @@ fn main() -> ExitCode {
         )
         .with_writer(std::io::stderr)
         .init();
-    match run(Cli::parse()) {
+    match run(Cli::parse_from(cli::joined_lists(std::env::args_os()))) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
@@ -31,6 +33,7 @@ fn main() -> ExitCode {
 fn run(cli: Cli) -> anyhow::Result<()> {
     match cli.command {
         Command::Serve(arguments) => serve::serve(&arguments),
+        Command::Render(arguments) => render::render(&arguments),
         Command::Scene {
             name,
             triangles,

@@ -9,8 +9,8 @@ use std::{
 };
 
 use anyhow::Context;
-use glam::{Quat, Vec3};
-use shadecast_protocol::{Codec, Pose, ServerTime, Sky, ToClient, Welcome};
+use glam::Vec3;
+use shadecast_protocol::{Codec, ServerTime, Sky, ToClient, Welcome};
 use shadecast_server::{
     Gpu, GpuScene, Input, Output, Pipeline, Session, SessionConfig,
     encode::OpenH264,
@@ -32,8 +32,6 @@ const PIXELS_PER_RADIAN: f32 = 1200.0;
 const SMALL_PIXELS_PER_RADIAN: f32 = 88.0;
 /// Triangles that a software renderer may be given by subdivision whatever the scene had.
 const FEW_TRIANGLES: usize = 40_000;
-/// Height of a standing person's eyes above the play space's floor.
-const EYE_HEIGHT: f32 = 1.6;
 /// Clients that may be connected without having proved that they may.
 const MOST_STRANGERS: usize = 8;
 
@@ -71,10 +69,7 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
     }
     let patched = patches::cut(scene, limits);
     status.print(&patched.report.to_string());
-    let spawn = patched
-        .scene
-        .spawn
-        .unwrap_or_else(|| spawn_for(&patched.scene));
+    let spawn = patched.scene.place_to_stand();
 
     let bar = status.progress("building the BVH");
     let gpu_scene = GpuScene::new(&gpu, &patched.scene, arguments.bounces, &mut |share| {
@@ -86,10 +81,7 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
             gpu_scene.texture_halvings
         ));
     }
-    let eye = spawn.then(Pose {
-        position: Vec3::Y * EYE_HEIGHT,
-        orientation: Quat::IDENTITY,
-    });
+    let eye = patched.scene.first_eye();
     status.say("compiling kernels and measuring the exposure");
     let exposure = match arguments.exposure {
         Some(exposure) => exposure as f32,
@@ -296,36 +288,6 @@ impl Server<'_> {
 /// The largest side that is at most an eighth of the atlas's and divides it.
 fn superblock_of(atlas_side: u16) -> u16 {
     1 << (atlas_side / 8).ilog2().min(atlas_side.trailing_zeros())
-}
-
-/// Where to stand in a scene that does not say: in the middle of a room, or
-/// before an object that is smaller than one.
-fn spawn_for(scene: &Scene) -> Pose {
-    let mut low = Vec3::INFINITY;
-    let mut high = Vec3::NEG_INFINITY;
-    for &position in &scene.positions {
-        low = low.min(position);
-        high = high.max(position);
-    }
-    if !low.is_finite() || !high.is_finite() {
-        return Pose::IDENTITY;
-    }
-    let (middle, size) = ((low + high) * 0.5, high - low);
-    /// A scene smaller than this is an object.
-    const ROOM: f32 = 4.0;
-    let position = if size.max_element() < ROOM {
-        Vec3::new(
-            middle.x,
-            middle.y - EYE_HEIGHT,
-            high.z + size.max_element().max(0.3),
-        )
-    } else {
-        Vec3::new(middle.x, low.y, middle.z)
-    };
-    Pose {
-        position,
-        orientation: Quat::IDENTITY,
-    }
 }
 
 /// The sky as the client draws it behind everything.

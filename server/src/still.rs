@@ -48,6 +48,14 @@ pub struct Still {
     pub radiance: Vec<Vec3>,
 }
 
+impl Still {
+    /// The exposure that shows it at a middling brightness.
+    #[must_use]
+    pub fn automatic_exposure(&self) -> f32 {
+        exposure_of(&self.radiance)
+    }
+}
+
 /// A picture in the making: samples can be added and looked at in turn.
 #[derive(Debug)]
 pub struct Film {
@@ -189,7 +197,7 @@ impl StillPass {
         gpu_scene: &GpuScene,
         eye: Pose,
     ) -> Result<f32, GpuError> {
-        let mut luminances = Vec::new();
+        let mut radiance = Vec::new();
         for turn in 0..4 {
             let turned = Pose {
                 position: Vec3::ZERO,
@@ -198,27 +206,37 @@ impl StillPass {
             let view = (eye.then(turned), [-1.0, 1.0, 1.0, -1.0]);
             let mut film = self.film(gpu, [32; 2])?;
             self.expose(gpu, gpu_scene, &mut film, view, EXPOSURE_SAMPLES, 1);
-            let still = self.develop(gpu, &film)?;
-            let weights = Vec3::new(0.2126, 0.7152, 0.0722);
-            luminances.extend(
-                still
-                    .radiance
-                    .iter()
-                    .map(|r| r.dot(weights))
-                    .filter(|l| *l > 0.0),
-            );
+            radiance.extend(self.develop(gpu, &film)?.radiance);
         }
-        if luminances.is_empty() {
-            return Ok(1.0);
-        }
-        luminances.sort_by(f32::total_cmp);
-        let log_mean =
-            luminances.iter().map(|l| f64::from(l.ln())).sum::<f64>() / luminances.len() as f64;
-        let bright = luminances[luminances.len() * 9 / 10];
-        Ok((MIDDLE_GREY / log_mean.exp() as f32)
-            .min(BRIGHT / bright)
-            .clamp(1e-6, 1e6))
+        Ok(exposure_of(&radiance))
     }
+
+    /// Rays traced so far.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn rays(&self, gpu: &Gpu) -> Result<u64, GpuError> {
+        self.paths.rays(gpu)
+    }
+}
+
+fn exposure_of(radiance: &[Vec3]) -> f32 {
+    let weights = Vec3::new(0.2126, 0.7152, 0.0722);
+    let mut luminances: Vec<f32> = radiance
+        .iter()
+        .map(|radiance| radiance.dot(weights))
+        .filter(|luminance| *luminance > 0.0)
+        .collect();
+    if luminances.is_empty() {
+        return 1.0;
+    }
+    luminances.sort_by(f32::total_cmp);
+    let sum_of_logs: f64 = luminances.iter().map(|l| f64::from(l.ln())).sum();
+    let log_mean = sum_of_logs / luminances.len() as f64;
+    let bright = luminances[luminances.len() * 9 / 10];
+    (MIDDLE_GREY / log_mean.exp() as f32)
+        .min(BRIGHT / bright)
+        .clamp(1e-6, 1e6)
 }
 
 /// Renders stills of a scene on a device of its own.
@@ -231,13 +249,17 @@ pub struct StillRenderer {
 }
 
 impl StillRenderer {
-    /// Opens a device and uploads the scene.
+    /// Opens a device and uploads the scene. `progress` is told the share done.
     ///
     /// # Errors
     /// When there is no device or the scene does not fit it.
-    pub fn new(scene: &Scene) -> anyhow::Result<Self> {
+    pub fn new(
+        scene: &Scene,
+        bounces: u32,
+        progress: &mut dyn FnMut(f32),
+    ) -> Result<Self, GpuError> {
         let gpu = Gpu::open()?;
-        let gpu_scene = GpuScene::new(&gpu, scene, DEFAULT_BOUNCES, &mut |_| ())?;
+        let gpu_scene = GpuScene::new(&gpu, scene, bounces, progress)?;
         let pass = StillPass::new(&gpu, &gpu_scene)?;
         Ok(Self {
             gpu,
@@ -293,6 +315,14 @@ impl StillRenderer {
     /// When the driver fails.
     pub fn develop(&self, film: &Film) -> Result<Still, GpuError> {
         self.pass.develop(&self.gpu, film)
+    }
+
+    /// Rays traced so far.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn rays(&self) -> Result<u64, GpuError> {
+        self.pass.rays(&self.gpu)
     }
 
     /// A picture in one go.

@@ -6,7 +6,7 @@ use glam::{Affine2, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 use shadecast_protocol::{Fov, ObjectId, Pose};
 use shadecast_server::{
     scene::{Corner, Image, Light, Material, Scene, SkyModel, TextureRef, Triangle, Wrap},
-    still::{Camera, StillRenderer},
+    still::{Camera, DEFAULT_BOUNCES, StillRenderer},
 };
 
 /// Between the middles of two squares, metres.
@@ -127,7 +127,7 @@ fn a_white_furnace_shows_the_albedo() {
     let (materials, albedos): (Vec<_>, Vec<_>) = materials_and_albedos.into_iter().unzip();
     let mut scene = squares(materials);
     scene.sky = SkyModel::constant(Vec3::ONE);
-    let mut renderer = StillRenderer::new(&scene).expect("a GPU");
+    let mut renderer = StillRenderer::new(&scene, DEFAULT_BOUNCES, &mut |_| ()).expect("a GPU");
     for (square, albedos) in (0..).zip(albedos) {
         for (angle, albedo) in angles.into_iter().zip(albedos) {
             let radiance = seen(&mut renderer, square, angle);
@@ -176,7 +176,7 @@ fn sunlit_and_glowing_squares_have_the_radiance_that_was_asked_for() {
         angular_radius: 0.0,
     }];
     let sunlit = irradiance * cosine / std::f32::consts::PI;
-    let mut renderer = StillRenderer::new(&scene).expect("a GPU");
+    let mut renderer = StillRenderer::new(&scene, DEFAULT_BOUNCES, &mut |_| ()).expect("a GPU");
     assert_near(seen(&mut renderer, 0, 0.0), grey * sunlit, 0.02);
     let [r, g, b, _] = texel.map(f32::from);
     let color = vec3(r, g, b) / 255.0;

@@ -11,7 +11,7 @@ use glam::Vec3;
 use image::{Rgb, RgbImage};
 use shadecast_server::{
     scene::Scene,
-    still::{Camera, Film, Still, StillRenderer},
+    still::{Camera, DEFAULT_BOUNCES, Film, Still, StillRenderer},
     tone_map,
 };
 
@@ -47,7 +47,8 @@ pub(super) fn render(
     deadline: Option<Instant>,
     progress: impl Fn(f32),
 ) -> Result<(Vec<Reference>, u32)> {
-    let mut renderer = StillRenderer::new(scene).context("cannot render references")?;
+    let mut renderer = StillRenderer::new(scene, DEFAULT_BOUNCES, &mut |_| ())
+        .context("cannot render references")?;
     let mut films = Vec::with_capacity(views.len());
     for View { camera, .. } in views {
         let film = || renderer.film([camera.width, camera.height]);

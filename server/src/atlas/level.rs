@@ -18,6 +18,10 @@ use shadecast_protocol::{Level, MIN_LOG2_SIDE, PatchShape};
 /// back and forth over any border, without moving a block.
 pub const HYSTERESIS: f32 = 0.65;
 
+/// Pixels below which a length counts as this: as good as nothing, and its
+/// reciprocal is finite.
+const SMALLEST: f32 = 1e-3;
+
 /// The block that a patch would have in an atlas without limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdealSize {
@@ -84,6 +88,10 @@ pub fn ideal_size(
             (area, (top_left + top_right).max(bottom), left.max(right))
         }
     };
+    // The outer texels lie on the patch's edges: n of them stand n - 1 apart.
+    let (width, height) = (width.max(SMALLEST), height.max(SMALLEST));
+    let area = area.max(SMALLEST * SMALLEST) * (1.0 + width.recip()) * (1.0 + height.recip());
+    let (width, height) = (width + 1.0, height + 1.0);
     let log2 = |x: f32| x.clamp(f32::MIN_POSITIVE, f32::MAX).log2();
     IdealSize {
         log2_area: log2(area).clamp(0.0, 32.0),

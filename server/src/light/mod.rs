@@ -17,8 +17,8 @@ use std::collections::HashSet;
 use glam::Vec3;
 use shadecast_protocol::{Block, PatchId};
 use shadecast_shaders::light::{
-    ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CELL_COUNT, CarryParameters, LightParameters, Move,
-    NO_BLOCK,
+    ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CELL_BYTES, CELL_COUNT, CarryParameters,
+    LightParameters, Move, NO_BLOCK,
 };
 use wgpu::ShaderStages;
 
@@ -104,7 +104,7 @@ impl Light {
         );
         let texels = Texels::new(gpu, texel_count)?;
         let shown = gpu.scratch("shown", texel_count * 16)?;
-        let cells = gpu.scratch("cells", u64::from(CELL_COUNT) * 16)?;
+        let cells = gpu.scratch("cells", u64::from(CELL_COUNT) * CELL_BYTES)?;
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
         let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
         let noise = gpu.scratch("noise", most_blocks * 4)?;
@@ -296,7 +296,7 @@ impl Light {
             pass.set_bind_group(1, &self.paths.group, &[]);
             pass.set_bind_group(2, &self.group, &[]);
             pass.set_pipeline(&self.fade);
-            pass.dispatch_workgroups(CELL_COUNT * 4 / 64, 1, 1);
+            pass.dispatch_workgroups(CELL_COUNT / 64, 1, 1);
             pass.set_pipeline(&self.smooth);
             let (x, y) = workgroups(records.len() as u32, 1);
             pass.dispatch_workgroups(x, y, 1);

@@ -12,6 +12,9 @@ use crate::gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout, workgroups};
 const LONGEST_WAVE: u32 = 1 << 18;
 /// Most times that the rays of a wave are traced: bounces and a camera's ray.
 const MOST_STEPS: u32 = 128;
+/// Of the lengths of the queues, and of their sum over all waves.
+const LENGTH_BYTES: u64 = MOST_STEPS as u64 * 4;
+const SUM_BYTES: u64 = 8;
 /// Threads of a workgroup in all kernels here.
 const GROUP: u32 = 64;
 
@@ -25,6 +28,7 @@ pub struct Paths {
     queued: wgpu::Buffer,
     trace: wgpu::ComputePipeline,
     advance: wgpu::ComputePipeline,
+    count: wgpu::ComputePipeline,
     longest_wave: u32,
 }
 
@@ -71,7 +75,9 @@ impl Paths {
         let advance =
             gpu.compute_pipeline(ADVANCE_SOURCE, "advance", &layouts, &gpu_scene.constants);
         let queue = gpu.scratch("ray queue", bytes * 3 * 4)?;
-        let queued = gpu.scratch("queue lengths", u64::from(MOST_STEPS) * 4)?;
+        let count =
+            gpu.compute_pipeline(TRACE_SOURCE, "count_rays", &layouts, &gpu_scene.constants);
+        let queued = gpu.scratch("queue lengths", LENGTH_BYTES + SUM_BYTES)?;
         let group = bind(
             gpu,
             &layout,
@@ -84,7 +90,23 @@ impl Paths {
             queued,
             trace,
             advance,
+            count,
             longest_wave,
+        })
+    }
+
+    /// Rays traced so far.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn rays(&self, gpu: &Gpu) -> Result<u64, GpuError> {
+        let readback = gpu.readback("rays", SUM_BYTES);
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(&self.queued, LENGTH_BYTES, &readback, 0, SUM_BYTES);
+        gpu.submit_and_read(encoder, &readback, SUM_BYTES, |bytes| {
+            bytemuck::pod_read_unaligned(bytes)
         })
     }
 
@@ -116,7 +138,7 @@ impl Paths {
                     .device
                     .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
                 if step == 0 {
-                    encoder.clear_buffer(&self.queued, 0, None);
+                    encoder.clear_buffer(&self.queued, 0, Some(LENGTH_BYTES));
                 }
                 gpu.queue
                     .write_buffer(&self.wave, 0, bytemuck::bytes_of(&wave));
@@ -138,6 +160,7 @@ impl Paths {
                     dispatch(&self.advance, path_count);
                     if step + 1 == steps {
                         dispatch(ends.finish, path_count);
+                        dispatch(&self.count, 1);
                     }
                 }
                 gpu.queue.submit([encoder.finish()]);

@@ -10,6 +10,7 @@ mod export;
 mod facts;
 mod gltf_load;
 mod inspect;
+mod spawn;
 mod tangents;
 
 use std::time::Duration;

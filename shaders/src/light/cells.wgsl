@@ -5,10 +5,22 @@
 // Sums are integers: adding them commutes, and the order of threads cannot show.
 // Source: Binder et al., "Massively Parallel Path Space Filtering", 2019.
 
-// Red, green, blue and count of each cell.
-@group(2) @binding(7) var<storage, read_write> cells: array<atomic<u32>>;
+struct Cell {
+    // Sums of red, green and blue, and their count, in sixteenths.
+    sum: array<atomic<u32>, 3>,
+    count: atomic<u32>,
+    // Greatest fingerprint of what was added, and greatest complement of one.
+    // Places that share an entry of the table by chance differ in them; what
+    // such an entry holds is not used.
+    greatest: atomic<u32>,
+    greatest_complement: atomic<u32>,
+}
 
-const CELL_COUNT: u32 = 65536u;
+@group(2) @binding(7) var<storage, read_write> cells: array<Cell>;
+
+const LOG2_CELL_COUNT: u32 = 17u;
+const CELL_COUNT: u32 = 1u << LOG2_CELL_COUNT;
+const MOST_FINGERPRINT: u32 = (1u << (32u - LOG2_CELL_COUNT)) - 1u;
 // Width of a cell per metre of distance.
 const CELL_ANGLE: f32 = 0.08;
 // Fixed point of the sums, and the brightest that one path may add.
@@ -17,6 +29,7 @@ const BRIGHTEST: f32 = 64.0;
 // Each update forgets this share of what the cells hold.
 const FORGETTING: u32 = 24u;
 
+// The cell's index, and its fingerprint above it.
 fn cell_around(position: vec3<f32>, n: vec3<f32>, jitter: vec2<f32>) -> u32 {
     let distance = max(length(position - parameters.eye), 1e-6);
     let level = floor(log2(distance * CELL_ANGLE));
@@ -27,29 +40,50 @@ fn cell_around(position: vec3<f32>, n: vec3<f32>, jitter: vec2<f32>) -> u32 {
     var side = select(select(2u, 1u, m.y >= m.z), 0u, m.x >= m.y && m.x >= m.z);
     side = side * 2u + select(0u, 1u, n[side] < 0.0);
     let key = bitcast<vec3<u32>>(place);
-    return hash(key.x ^ hash(key.y ^ hash(key.z ^ hash(side ^ (bitcast<u32>(i32(level)) << 3u))))) % CELL_COUNT;
+    return hash(key.x ^ hash(key.y ^ hash(key.z ^ hash(side ^ (bitcast<u32>(i32(level)) << 3u)))));
 }
 
-fn add_to_cell(cell: u32, light: vec3<f32>) {
+fn add_to_cell(key: u32, light: vec3<f32>) {
+    let cell = key % CELL_COUNT;
+    let fingerprint = key >> LOG2_CELL_COUNT;
     let fixed = vec3<u32>(min(light, vec3<f32>(BRIGHTEST)) * CELL_UNIT);
-    atomicAdd(&cells[cell * 4u], fixed.x);
-    atomicAdd(&cells[cell * 4u + 1u], fixed.y);
-    atomicAdd(&cells[cell * 4u + 2u], fixed.z);
-    atomicAdd(&cells[cell * 4u + 3u], 16u);
+    atomicAdd(&cells[cell].sum[0], fixed.x);
+    atomicAdd(&cells[cell].sum[1], fixed.y);
+    atomicAdd(&cells[cell].sum[2], fixed.z);
+    atomicAdd(&cells[cell].count, 16u);
+    atomicMax(&cells[cell].greatest, fingerprint);
+    atomicMax(&cells[cell].greatest_complement, MOST_FINGERPRINT - fingerprint);
 }
 
-// Mean light of a cell, and how many paths it comes from.
-fn cell_light(cell: u32) -> vec4<f32> {
-    let count = f32(atomicLoad(&cells[cell * 4u + 3u])) / 16.0;
-    let sum = vec3<f32>(vec3<u32>(atomicLoad(&cells[cell * 4u]), atomicLoad(&cells[cell * 4u + 1u]),
-        atomicLoad(&cells[cell * 4u + 2u])));
+// Mean light of a cell, and how many paths it comes from: none where it is shared.
+fn cell_light(key: u32) -> vec4<f32> {
+    let cell = key % CELL_COUNT;
+    let fingerprint = key >> LOG2_CELL_COUNT;
+    let is_own = atomicLoad(&cells[cell].greatest) == fingerprint
+        && atomicLoad(&cells[cell].greatest_complement) == MOST_FINGERPRINT - fingerprint;
+    let count = select(0.0, f32(atomicLoad(&cells[cell].count)) / 16.0, is_own);
+    let sum = vec3<f32>(vec3<u32>(atomicLoad(&cells[cell].sum[0]), atomicLoad(&cells[cell].sum[1]),
+        atomicLoad(&cells[cell].sum[2])));
     return vec4<f32>(sum / (CELL_UNIT * max(count, 1.0)), count);
 }
 
 @compute @workgroup_size(64)
 fn fade_cells(@builtin(global_invocation_id) id: vec3<u32>) {
-    if (id.x < CELL_COUNT * 4u) {
-        let held = atomicLoad(&cells[id.x]);
-        atomicStore(&cells[id.x], held - held / FORGETTING);
+    if (id.x >= CELL_COUNT) {
+        return;
+    }
+    let held = atomicLoad(&cells[id.x].count);
+    if (held == 0u) {
+        return;
+    }
+    let left = held - (held + FORGETTING - 1u) / FORGETTING;
+    atomicStore(&cells[id.x].count, left);
+    for (var i = 0u; i < 3u; i++) {
+        let sum = atomicLoad(&cells[id.x].sum[i]);
+        atomicStore(&cells[id.x].sum[i], select(0u, sum - sum / FORGETTING, left > 0u));
+    }
+    if (left == 0u) {
+        atomicStore(&cells[id.x].greatest, 0u);
+        atomicStore(&cells[id.x].greatest_complement, 0u);
     }
 }

@@ -32,7 +32,7 @@ macro_rules! path_source {
     };
 }
 
-/// Kernel `trace_rays`.
+/// Kernels `trace_rays` and `count_rays`.
 pub const TRACE_SOURCE: &str = concat!(include_str!("scene.wgsl"), include_str!("trace.wgsl"));
 /// Kernel `advance`.
 pub const ADVANCE_SOURCE: &str = path_source!();
@@ -43,6 +43,8 @@ pub const ATLAS_SOURCE: &str =
 /// Kernels `start_at_pixels` and `add_to_pixels`.
 pub const STILL_SOURCE: &str = path_source!("still.wgsl");
 /// Cells of the hash in which light is shared with its surroundings.
-pub const CELL_COUNT: u32 = 65_536;
+pub const CELL_COUNT: u32 = 1 << 17;
+/// Bytes of each.
+pub const CELL_BYTES: u64 = 24;
 /// Kernel `carry_blocks`.
 pub const CARRY_SOURCE: &str = include_str!("carry.wgsl");

@@ -27,7 +27,7 @@ struct Hit {
 // Rays of this step, in no particular order: what each finds goes to its own
 // place, so that the order in which threads arrive cannot show.
 @group(1) @binding(4) var<storage, read_write> queue: array<u32>;
-// Length of the queue at each step.
+// Length of the queue at each step, and at the end the sum over all waves.
 @group(1) @binding(5) var<storage, read_write> queued: array<atomic<u32>>;
 
 // Set in a hit's triangle when the ray came near a moving object.
@@ -177,6 +177,17 @@ fn trace(origin: vec3<f32>, direction: vec3<f32>, start: f32, t_max: f32, any: b
         }
     }
     return hit;
+}
+
+// Adds the lengths of the wave's queues to the sum behind them, 64 bits in two words.
+@compute @workgroup_size(1)
+fn count_rays() {
+    let end = arrayLength(&queued) - 2u;
+    for (var step = 0u; step <= wave.step; step++) {
+        let rays = atomicLoad(&queued[step]);
+        let before = atomicAdd(&queued[end], rays);
+        atomicAdd(&queued[end + 1u], select(0u, 1u, before > 0xffffffffu - rays));
+    }
 }
 
 fn is_masked(triangle: u32) -> bool {
