@@ -68,7 +68,7 @@ pub(crate) struct Args {
 
     /// Single eyes written before the lens, from 5 s after the first picture,
     /// with the pose at which each was drawn
-    #[arg(long, value_name = "N", default_value_t = 24, value_parser = clap::value_parser!(u32).range(0..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 20, value_parser = clap::value_parser!(u32).range(0..=1000))]
     pub(crate) samples: u32,
 
     /// Opens a window: click, then the mouse looks and W A S D Q E move; Esc quits

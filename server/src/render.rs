@@ -22,14 +22,24 @@ use crate::{
 
 /// How far a view's rows may be from unit vectors at right angles.
 const RIGID: f64 = 1e-3;
-/// Time that a step between two looks at the clock should take.
-const STEP: Duration = Duration::from_millis(250);
+/// Paths between two looks at the clock: half a second of a software driver. Always
+/// the same, because the order of a sum of floats shows in its last digits.
+const PATHS_A_STEP: u32 = 1 << 16;
 
 pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
     let (exr, png) = outputs(&arguments.out)?;
+    let fov = field_of_view(arguments)?;
     let mut scene = crate::load(&arguments.scene)?;
     light(&mut scene, arguments);
-    let camera = camera(arguments, &scene)?;
+    let camera = Camera {
+        world_from_eye: match &arguments.view {
+            Some(view) => pose_from_view(view).context("--view")?,
+            None => scene.first_eye(),
+        },
+        fov,
+        width: arguments.width,
+        height: arguments.height,
+    };
 
     let status = Status::new();
     let progress = status.progress("building the tree of triangles");
@@ -37,8 +47,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
     let progress = status.progress("rendering");
     let mut film = renderer.film([camera.width, camera.height])?;
     let began = Instant::now();
-    // The first samples wait until the driver has compiled the kernels.
-    let mut step = 1;
+    let step = (PATHS_A_STEP / (camera.width * camera.height)).max(1);
     loop {
         let share = match arguments.seconds {
             Some(seconds) => began.elapsed().as_secs_f64() / seconds,
@@ -48,14 +57,11 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
         if share >= 1.0 {
             break;
         }
-        let step_began = Instant::now();
-        let wanted = match arguments.seconds {
+        let samples = match arguments.seconds {
             Some(_) => step,
             None => step.min(arguments.spp - film.samples()),
         };
-        renderer.expose(&mut film, &camera, Duration::ZERO, wanted, arguments.seed)?;
-        let speed = f64::from(wanted) / step_began.elapsed().as_secs_f64().max(1e-6);
-        step = (speed * STEP.as_secs_f64()).clamp(1.0, 4096.0) as u32;
+        renderer.expose(&mut film, &camera, Duration::ZERO, samples, arguments.seed)?;
     }
     let seconds = began.elapsed().as_secs_f64();
     let still = renderer.develop(&film)?;
@@ -86,6 +92,12 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
 
 /// Of an EXR file also a PNG beside it.
 fn outputs(out: &Path) -> anyhow::Result<(Option<PathBuf>, PathBuf)> {
+    let folder = out.parent().filter(|folder| !folder.as_os_str().is_empty());
+    ensure!(
+        folder.is_none_or(Path::is_dir),
+        "the folder of --out {} does not exist",
+        out.display()
+    );
     let extension = out.extension().and_then(|extension| extension.to_str());
     match extension.map(str::to_ascii_lowercase).as_deref() {
         Some("exr") => Ok((Some(out.to_owned()), out.with_extension("png"))),
@@ -119,11 +131,7 @@ fn light(scene: &mut Scene, arguments: &RenderArguments) {
     }
 }
 
-fn camera(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<Camera> {
-    let world_from_eye = match &arguments.view {
-        Some(view) => pose_from_view(view).context("--view")?,
-        None => scene.first_eye(),
-    };
+fn field_of_view(arguments: &RenderArguments) -> anyhow::Result<Fov> {
     let (width, height) = (arguments.width, arguments.height);
     let [left, right, down, up] = arguments.tangents.unwrap_or_else(|| {
         let up = (arguments.fovy.to_radians() * 0.5).tan();
@@ -141,12 +149,7 @@ fn camera(arguments: &RenderArguments, scene: &Scene) -> anyhow::Result<Camera> 
         "the field of view must open to less than 179 degrees, its left below its right \
          and its lower side below its upper one"
     );
-    Ok(Camera {
-        world_from_eye,
-        fov,
-        width,
-        height,
-    })
+    Ok(fov)
 }
 
 /// The camera's pose from a world-to-camera matrix, row by row.
@@ -231,9 +234,9 @@ mod tests {
 
     #[test]
     fn an_exr_has_a_png_beside_it() {
-        let (exr, png) = outputs(Path::new("a/b.EXR")).unwrap();
-        assert_eq!(exr.unwrap(), Path::new("a/b.EXR"));
-        assert_eq!(png, Path::new("a/b.png"));
+        let (exr, png) = outputs(Path::new("b.EXR")).unwrap();
+        assert_eq!(exr.unwrap(), Path::new("b.EXR"));
+        assert_eq!(png, Path::new("b.png"));
         assert_eq!(outputs(Path::new("b.png")).unwrap().0, None);
         assert!(outputs(Path::new("b")).is_err() && outputs(Path::new("b.jpg")).is_err());
     }

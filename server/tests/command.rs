@@ -156,3 +156,78 @@ fn a_superblock_that_does_not_divide_the_atlas_is_refused() {
         "{said}"
     );
 }
+
+#[test]
+fn a_picture_that_cannot_be_written_is_refused_before_it_is_rendered() {
+    for out in ["picture.jpg", "picture", "no/such/folder/picture.exr"] {
+        let said = complaint(&["render", "courtyard", "--out", out]);
+        assert_eq!(said.lines().count(), 1, "{said}");
+        assert!(said.starts_with("error: ") && said.contains(out), "{said}");
+    }
+    let said = complaint(&["render", "courtyard", "--out", "a.png", "--view", "1 2 3"]);
+    let sentence = said.lines().next().unwrap_or_default();
+    assert!(sentence.contains("--view"), "{said}");
+    let said = complaint(&[
+        "render",
+        "courtyard",
+        "--out",
+        "a.png",
+        "--tangents",
+        "1,-1,1,-1",
+    ]);
+    assert!(said.contains("field of view"), "{said}");
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_seed_is_a_picture() {
+    let folder = Folder::new("render");
+    let render = |name: &str, seed: &str| {
+        let out = folder.0.join(name);
+        let output = shadecast(&[
+            "render",
+            "courtyard",
+            "--triangles",
+            "4000",
+            "--width",
+            "24",
+            "--height",
+            "16",
+            "--spp",
+            "3",
+            "--seed",
+            seed,
+            "--env",
+            "const:1,1,1",
+            "--sun",
+            "0",
+            "-1",
+            "0",
+            "2",
+            "2",
+            "2",
+            "--out",
+            out.to_str().expect("a plain path"),
+        ]);
+        assert!(output.status.success(), "{output:?}");
+        let said = String::from_utf8(output.stdout).expect("it speaks UTF-8");
+        assert!(
+            said.contains("24x16, 3 samples a pixel, 1 bounces"),
+            "{said}"
+        );
+        assert!(said.contains("Mrays/s") && said.contains(name), "{said}");
+        let png = image::open(out.with_extension("png")).expect("a PNG beside it");
+        let exr = image::open(&out).expect("an EXR").into_rgb32f();
+        assert_eq!((png.width(), png.height()), exr.dimensions());
+        exr
+    };
+    let first = render("first.exr", "7");
+    assert_eq!(first, render("again.exr", "7"));
+    assert_ne!(first, render("other.exr", "8"));
+    assert!(
+        first
+            .iter()
+            .all(|channel| channel.is_finite() && *channel >= 0.0)
+    );
+    assert!(first.iter().any(|channel| *channel > 0.5));
+}

@@ -1,6 +1,6 @@
 //! Surfaces whose radiance is known without a path tracer.
 
-use std::time::Duration;
+use std::{f32::consts::PI, time::Duration};
 
 use glam::{Affine2, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 use shadecast_protocol::{Fov, ObjectId, Pose};
@@ -48,6 +48,10 @@ fn squares(materials: Vec<Material>) -> Scene {
     }
     scene.materials = materials;
     scene
+}
+
+fn renderer(scene: &Scene) -> StillRenderer {
+    StillRenderer::new(scene, DEFAULT_BOUNCES, &mut |_| ()).expect("a GPU")
 }
 
 fn middle_of(square: u32) -> Vec3 {
@@ -127,7 +131,7 @@ fn a_white_furnace_shows_the_albedo() {
     let (materials, albedos): (Vec<_>, Vec<_>) = materials_and_albedos.into_iter().unzip();
     let mut scene = squares(materials);
     scene.sky = SkyModel::constant(Vec3::ONE);
-    let mut renderer = StillRenderer::new(&scene, DEFAULT_BOUNCES, &mut |_| ()).expect("a GPU");
+    let mut renderer = renderer(&scene);
     for (square, albedos) in (0..).zip(albedos) {
         for (angle, albedo) in angles.into_iter().zip(albedos) {
             let radiance = seen(&mut renderer, square, angle);
@@ -175,12 +179,100 @@ fn sunlit_and_glowing_squares_have_the_radiance_that_was_asked_for() {
         irradiance,
         angular_radius: 0.0,
     }];
-    let sunlit = irradiance * cosine / std::f32::consts::PI;
-    let mut renderer = StillRenderer::new(&scene, DEFAULT_BOUNCES, &mut |_| ()).expect("a GPU");
+    let sunlit = irradiance * cosine / PI;
+    let mut renderer = renderer(&scene);
     assert_near(seen(&mut renderer, 0, 0.0), grey * sunlit, 0.02);
     let [r, g, b, _] = texel.map(f32::from);
     let color = vec3(r, g, b) / 255.0;
     let linear = color.map(|c| ((c + 0.055) / 1.055).powf(2.4));
     assert_near(seen(&mut renderer, 1, 0.0), linear * sunlit, 0.02);
     assert_near(seen(&mut renderer, 2, 0.0), glow, 1e-3);
+}
+
+fn point_lamp(position: Vec3, intensity: f32) -> Light {
+    Light::Point {
+        position,
+        intensity: Vec3::splat(intensity),
+        range: f32::INFINITY,
+    }
+}
+
+/// Irradiance on the plane z = 0 below the origin's normal, W/m².
+fn irradiance_at(point: Vec3, lamp: Vec3, intensity: f32) -> f32 {
+    let to_lamp = lamp - point;
+    intensity * to_lamp.z.max(0.0) / to_lamp.length().powi(3)
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn lamps_light_a_plane_as_closed_forms_say() {
+    let albedo = 0.5;
+    let grey = || matte(Vec3::splat(albedo));
+
+    // A point lamp, beside one that is below the plane.
+    let mut scene = squares(vec![grey()]);
+    scene.lights = vec![
+        point_lamp(vec3(3.0, 1.0, 10.0), 80.0),
+        point_lamp(vec3(0.5, 0.0, -1.0), 500.0),
+    ];
+    let expected = albedo * irradiance_at(Vec3::ZERO, vec3(3.0, 1.0, 10.0), 80.0) / PI;
+    let mut renderer = renderer(&scene);
+    assert_near(seen(&mut renderer, 0, 0.3), Vec3::splat(expected), 0.005);
+
+    // A square lamp of two metres, four metres above and facing down.
+    let mut scene = squares(vec![grey()]);
+    let glow = 3.0;
+    scene.materials.push(Material {
+        emissive: Vec3::splat(glow),
+        ..matte(Vec3::ZERO)
+    });
+    let first = scene.positions.len() as u32;
+    for place in [
+        vec2(-1.0, -1.0),
+        vec2(-1.0, 1.0),
+        vec2(1.0, 1.0),
+        vec2(1.0, -1.0),
+    ] {
+        scene.positions.push(place.extend(4.0));
+        scene.corners.push(Corner {
+            normal: Vec3::NEG_Z,
+            ..scene.corners[0]
+        });
+    }
+    for corners in [[0, 1, 2], [0, 2, 3]].map(|corners| corners.map(|c| first + c)) {
+        scene.triangles.push(Triangle {
+            positions: corners,
+            corners,
+            material: 1,
+            object: ObjectId::WORLD,
+        });
+    }
+    // Form factor of a quarter of it from below its corner, times four.
+    let x = 1.0_f32 / 4.0;
+    let root = (1.0 + x * x).sqrt();
+    let form_factor = 4.0 * (2.0 * x / root * (x / root).atan()) / (2.0 * PI);
+    let mut renderer = self::renderer(&scene);
+    let found = seen(&mut renderer, 0, 0.3);
+    assert_near(found, Vec3::splat(albedo * glow * form_factor), 0.005);
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn thousands_of_lamps_add_up() {
+    let albedo = 0.5;
+    let mut scene = squares(vec![matte(Vec3::splat(albedo))]);
+    let mut irradiance = 0.0;
+    for lamp in 0..2000_u32 {
+        // A golden spiral of unequal lamps, a few of them below the plane.
+        let turn = 2.399_963 * lamp as f32;
+        let distance = 0.25 * (lamp as f32).sqrt();
+        let height = (lamp % 17) as f32 * 0.5 - 0.5 + 0.11;
+        let position = vec3(distance * turn.cos(), distance * turn.sin(), height);
+        let intensity = 0.001 * (1 + lamp % 5) as f32 * (height * height);
+        irradiance += irradiance_at(Vec3::ZERO, position, intensity);
+        scene.lights.push(point_lamp(position, intensity));
+    }
+    let mut renderer = renderer(&scene);
+    let expected = albedo * irradiance / PI;
+    assert_near(seen(&mut renderer, 0, 0.3), Vec3::splat(expected), 0.02);
 }

@@ -57,8 +57,9 @@ pub struct Options {
     /// Seed of the head motion and of the references.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u32,
-    /// Seconds that all references together may take.
-    #[arg(long, value_name = "N", default_value_t = 52)]
+    /// Seconds that everything but the streaming may take: starting, and then the
+    /// references, which get better with time.
+    #[arg(long, value_name = "N", default_value_t = 62)]
     pub reference_seconds: u32,
     /// Compares whole pictures instead of a window of each, however long that takes.
     #[arg(long, conflicts_with = "reference_seconds")]
@@ -92,7 +93,8 @@ pub fn run(options: &Options) -> Result<String> {
     );
 
     eprintln!("rendering {} references", client.samples.len());
-    let deadline = Instant::now() + Duration::from_secs(options.reference_seconds.into());
+    let seconds = options.seconds.saturating_add(options.reference_seconds);
+    let deadline = began + Duration::from_secs(seconds.into());
     let windows = windows(options, &client);
     let bar = reference_bar();
     let (references, reference_samples) = references::render(

@@ -56,14 +56,17 @@ pub(super) fn render(
     }
     let began = Instant::now();
     let mut rounds = Rounds::default();
-    while rounds.go_on(deadline.map(|deadline| deadline.duration_since(began))) {
+    while rounds.go_on(deadline.map(|deadline| deadline.saturating_duration_since(began))) {
         for (index, (view, halves)) in (0..).zip(views.iter().zip(&mut films)) {
             for (half, film) in (0..).zip(halves) {
                 let seed = seed.wrapping_add(2 * index + half);
                 renderer.expose(film, &view.camera, view.scene_time, SAMPLES_A_ROUND, seed)?;
             }
             let of_round = (index + 1) as f32 / views.len() as f32;
-            progress(rounds.share(of_round, deadline.map(|deadline| deadline - began)));
+            progress(rounds.share(
+                of_round,
+                deadline.map(|deadline| deadline.saturating_duration_since(began)),
+            ));
         }
         rounds.done(began.elapsed());
     }

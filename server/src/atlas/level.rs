@@ -6,8 +6,9 @@
 //! on where the eye looks, only on where it is.
 //!
 //! Source: Mueller et al., "Shading Atlas Streaming", 2018, section 4.3,
-//! equations 1 and 2. We differ in [`steady_level`], which lets a block stay
-//! where rounding alone would make it jump.
+//! equations 1 and 2. We differ in giving a side of `n` pixels `n + 1` texels,
+//! because the outer ones lie on the patch's edges, and in [`steady_level`], which
+//! lets a block stay where rounding alone would make it jump.
 
 use glam::{DVec3, Vec3};
 use shadecast_protocol::{Level, MIN_LOG2_SIDE, PatchShape};
@@ -220,17 +221,20 @@ mod tests {
     }
 
     #[test]
-    fn a_square_metre_gets_its_pixels() {
+    fn a_square_metre_gets_its_pixels_and_one_more_a_side() {
         let eye = Vec3::new(0.5, 0.5, 10.0);
         let size = ideal_size(PatchShape::Pair, &UNIT_PAIR, eye, 640.0);
-        assert!((size.log2_area - 12.0).abs() < 0.02 && size.log2_aspect.abs() < 1e-5);
+        let square = 2.0 * 65_f32.log2();
+        assert!((size.log2_area - square).abs() < 0.02 && size.log2_aspect.abs() < 1e-5);
+        let small = ideal_size(PatchShape::Pair, &UNIT_PAIR, eye, 10.0);
+        assert!((small.log2_area - 2.0).abs() < 0.02, "a pixel's corners");
         let solo = ideal_size(
             PatchShape::Solo,
             &[Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Y, Vec3::Y],
             eye,
             640.0,
         );
-        assert!((solo.log2_area - 12.0).abs() < 0.02, "twice its half");
+        assert!((solo.log2_area - square).abs() < 0.02, "twice its half");
         let strip = [
             Vec3::ZERO,
             Vec3::X,
@@ -239,7 +243,9 @@ mod tests {
             Vec3::Y,
         ];
         let triple = ideal_size(PatchShape::Triple, &strip, eye, 640.0);
-        assert!((triple.log2_area - 13.0).abs() < 0.02 && (triple.log2_aspect - 1.0).abs() < 0.02);
+        let [wide, high] = [129_f32, 65.0].map(f32::log2);
+        assert!((triple.log2_area - (wide + high)).abs() < 0.03);
+        assert!((triple.log2_aspect - (wide - high)).abs() < 0.02);
     }
 
     #[test]

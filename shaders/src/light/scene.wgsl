@@ -155,16 +155,14 @@ fn sky_radiance(d: vec3<f32>) -> vec3<f32> {
     return mix(globals.sky_horizon, globals.sky_zenith, sqrt(d.y));
 }
 
+// Repeats where the mode is 0, mirrors where it is 1, clamps elsewhere. Divides
+// in floats, which software drivers have vectors of: exact, as the half keeps the
+// quotient off whole numbers.
 fn wrap(i: i32, size: i32, mode: u32) -> i32 {
-    if (mode == 0u) {
-        return ((i % size) + size) % size;
-    }
-    if (mode == 1u) {
-        let period = 2 * size;
-        let j = ((i % period) + period) % period;
-        return select(j, period - 1 - j, j >= size);
-    }
-    return clamp(i, 0, size - 1);
+    let period = select(size, 2 * size, mode == 1u);
+    let j = i - i32(floor((f32(i) + 0.5) / f32(period))) * period;
+    let repeated = select(j, period - 1 - j, j >= size);
+    return select(repeated, clamp(i, 0, size - 1), mode > 1u);
 }
 
 fn fetch(record: TextureRecord, base: u32, size: vec2<i32>, at: vec2<i32>) -> vec4<f32> {
