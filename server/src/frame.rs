@@ -25,9 +25,6 @@ use crate::{
 const LONGEST_HISTORY: f32 = 4096.0;
 /// The same on an object that moves, and its light with it.
 const MOVING_HISTORY: f32 = 8.0;
-/// Texels asked for per pixel and axis. More than one, because bilinear lookup
-/// blurs by about a texel and the outer half texels of a block lie beyond its patch.
-const TEXELS_PER_PIXEL: f32 = 1.0;
 
 /// What a frame is made for.
 #[derive(Clone, Debug)]
@@ -201,9 +198,12 @@ impl Pipeline {
                 .potential(&self.gpu, &self.gpu_scene, &order.prediction, &poses)?;
         stages.visibility = lap();
 
-        let placed = self
-            .atlas
-            .place(&self.requests(&visible, &order.prediction, &poses));
+        let eye = eye_of(&order.prediction);
+        let in_objects = poses.iter().map(|pose| pose.inverse().transform_point(eye));
+        let eyes: Vec<Vec3> = std::iter::once(eye).chain(in_objects).collect();
+        let pixels_per_radian = order.prediction.pixels_per_radian();
+        let requests = self.requests(&visible, &eyes, pixels_per_radian);
+        let placed = self.atlas.place(&requests);
         let mut moved = placed.moved.iter().peekable();
         for placement in &placed.placements {
             let old = moved.next_if(|(patch, ..)| *patch == placement.patch);
@@ -217,11 +217,6 @@ impl Pipeline {
         let lit = visible.iter().filter_map(|patch| {
             Some((patch.patch, self.atlas.block_of(patch.patch)?, patch.pixels))
         });
-        let eye = eye_of(&order.prediction);
-        let in_objects = poses
-            .iter()
-            .map(|world_from_object| world_from_object.inverse().transform_point(eye));
-        let eyes: Vec<Vec3> = std::iter::once(eye).chain(in_objects).collect();
         let jobs = self
             .schedule
             .choose(&self.scene.patches, lit, order.paths, &eyes);
@@ -286,29 +281,25 @@ impl Pipeline {
         })
     }
 
-    /// What each visible patch deserves, measured from between the eyes.
+    /// What each visible patch deserves, seen from between the eyes; `eyes[n]` is
+    /// that point in the space of `ObjectId(n)`.
     fn requests(
         &self,
         visible: &[VisiblePatch],
-        prediction: &Prediction,
-        poses: &[Pose],
+        eyes: &[Vec3],
+        pixels_per_radian: f32,
     ) -> Vec<Request> {
-        let eye = eye_of(prediction);
-        let pixels_per_radian = prediction.pixels_per_radian() * TEXELS_PER_PIXEL;
         visible
             .iter()
             .map(|visible| {
                 let patch = &self.scene.patches[visible.patch.0 as usize];
-                let eye_in_object = match (patch.object.0 as usize).checked_sub(1) {
-                    None => eye,
-                    Some(object) => poses[object].inverse().transform_point(eye),
-                };
+                let eye = eyes[usize::from(patch.object.0)];
                 let corners = patch
                     .corners
                     .map(|corner| self.scene.scene.positions[corner as usize]);
                 Request {
                     patch: visible.patch,
-                    ideal: ideal_size(patch.shape, &corners, eye_in_object, pixels_per_radian),
+                    ideal: ideal_size(patch.shape, &corners, eye, pixels_per_radian),
                     importance: visible.pixels as f32,
                 }
             })

@@ -123,7 +123,7 @@ fn lamp_density(triangle: u32, p: vec3<f32>, n: vec3<f32>) -> f32 {
 // Light from one of the lamps. With `with_bsdf_rays`, emissive triangles are
 // also met by BSDF samples and the two share by the balance heuristic.
 fn lamp_sample(s: Surface, wo: vec3<f32>, u_choice: f32, u: vec2<f32>, with_bsdf_rays: bool) -> LightSample {
-    let origin = offset_origin(s.position, s.ng);
+    let origin = offset_origin(s);
     let choice = choose_lamp(origin, s.ns, u_choice);
     if (choice.probability <= 0.0) {
         return NO_LIGHT;

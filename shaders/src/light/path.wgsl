@@ -79,7 +79,7 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
     let last = vertex >= globals.bounces;
     let apart = vertex == 0u && (state.progress & LOBES_APART) != 0u;
     var rng = Sampler(state.sample_index, state.seed, PAIRS_AT_START + vertex * PAIRS_PER_VERTEX);
-    let origin = offset_origin(s.position, s.ng);
+    let origin = offset_origin(s);
 
     if (HAS_SUN) {
         let sun = sun_sample(s, wo, sample_2d(&rng));

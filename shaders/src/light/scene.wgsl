@@ -204,6 +204,8 @@ fn texture_at(record: TextureRecord, uv0: vec2<f32>, uv1: vec2<f32>, footprint: 
 // What light meets at a point.
 struct Surface {
     position: vec3<f32>,
+    // Beyond the rounding of the position, metres.
+    margin: f32,
     // Geometric and shading normal, both on the side that is looked at.
     ng: vec3<f32>,
     ns: vec3<f32>,
@@ -215,6 +217,10 @@ struct Surface {
     f0: f32,
 }
 
+// Relative rounding of single precision. A point on a triangle is off by about one
+// of its coordinates' and one of the triangle's size; where a ray meets the plane,
+// by a few of the latter.
+const ROUNDING: f32 = 1.1920929e-7;
 // Smallest GGX alpha: below it the lobe's peak leaves the range in which f32 keeps its shape.
 const MIN_ALPHA: f32 = 0.001;
 
@@ -278,6 +284,10 @@ fn surface_at(triangle: u32, b: vec2<f32>, wo: vec3<f32>, width: f32) -> Surface
         ng = transform_vector(m, ng);
         ns = transform_vector(m, ns);
     }
+    let reach = max(abs(e1), abs(e2));
+    let coordinates = abs(s.position);
+    s.margin = ROUNDING * (8.0 * max(max(reach.x, reach.y), reach.z)
+        + 2.0 * max(max(coordinates.x, coordinates.y), coordinates.z));
     let length_ns = length(ns);
     ns = select(ng, ns / length_ns, length_ns > 1e-12);
     let front = dot(wo, ng) >= 0.0;
@@ -303,12 +313,9 @@ fn surface_at(triangle: u32, b: vec2<f32>, wo: vec3<f32>, width: f32) -> Surface
     return s;
 }
 
-// A ray origin that does not meet its own triangle, without a scene-scale epsilon.
-// Source: Waechter and Binder, "A Fast and Robust Method for Avoiding
-// Self-Intersection", Ray Tracing Gems, 2019, chapter 6.
-fn offset_origin(p: vec3<f32>, n: vec3<f32>) -> vec3<f32> {
-    let step = vec3<i32>(n * 256.0);
-    let bits = bitcast<vec3<i32>>(p);
-    let moved = bitcast<vec3<f32>>(bits + select(step, -step, p < vec3<f32>(0.0)));
-    return select(moved, p + n * (1.0 / 65536.0), abs(p) < vec3<f32>(1.0 / 32.0));
+// A ray origin that does not meet its own triangle, whatever the scale of the scene:
+// what rounding may move the point or the triangle's plane by grows with the
+// coordinates and with the triangle.
+fn offset_origin(s: Surface) -> vec3<f32> {
+    return s.position + s.ng * s.margin;
 }
