@@ -177,27 +177,21 @@ pub(crate) fn joined_lists(arguments: impl Iterator<Item = OsString>) -> Vec<OsS
         parts.all(|part| part.parse::<f64>().is_ok())
     };
     let mut joined: Vec<OsString> = Vec::new();
-    let mut open = false;
+    // What stands before the next number, while a list is open.
+    let mut separator = None;
     for argument in arguments {
         let text = argument.to_str().unwrap_or_default();
-        if open && is_list(text) {
-            if let Some(list) = joined.last_mut() {
-                list.push(
-                    if list
-                        .to_string_lossy()
-                        .ends_with(|c: char| c.is_ascii_alphabetic())
-                    {
-                        "="
-                    } else {
-                        ","
-                    },
-                );
+        match (separator, joined.last_mut()) {
+            (Some(before), Some(list)) if is_list(text) => {
+                list.push(before);
                 list.push(text);
+                separator = Some(",");
             }
-            continue;
+            _ => {
+                separator = LISTS.contains(&text).then_some("=");
+                joined.push(argument);
+            }
         }
-        open = LISTS.contains(&text);
-        joined.push(argument);
     }
     joined
 }

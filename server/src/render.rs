@@ -7,12 +7,11 @@ use std::{
 
 use anyhow::{Context, ensure};
 use glam::{DMat3, DQuat, DVec3};
-use image::{Rgb, Rgb32FImage, RgbImage};
+use image::{ImageResult, Rgb, Rgb32FImage};
 use shadecast_protocol::{Fov, Pose};
 use shadecast_server::{
     scene::{Light, Scene, SkyModel},
     still::{Camera, Still, StillRenderer},
-    tone_map,
 };
 
 use crate::{
@@ -68,13 +67,17 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
     let rays = renderer.rays()?;
     status.clear();
 
+    let cannot_write = |path: &Path| format!("cannot write {}", path.display());
     if let Some(exr) = &exr {
-        write_exr(&still, exr)?;
+        write_exr(&still, exr).with_context(|| cannot_write(exr))?;
     }
     let exposure = arguments
         .exposure
         .map_or_else(|| still.automatic_exposure(), |exposure| exposure as f32);
-    write_png(&still, exposure, &png)?;
+    still
+        .displayed(exposure)
+        .save(&png)
+        .with_context(|| cannot_write(&png))?;
     println!(
         "{}x{}, {} samples a pixel, {} bounces, in {seconds:.2} s: {:.3} Mrays/s on {}",
         still.width,
@@ -177,24 +180,13 @@ fn pose_from_view(view: &[f64; 16]) -> anyhow::Result<Pose> {
     })
 }
 
-fn write_exr(still: &Still, path: &Path) -> anyhow::Result<()> {
+/// Linear radiance, 32-bit floats.
+fn write_exr(still: &Still, path: &Path) -> ImageResult<()> {
     let mut picture = Rgb32FImage::new(still.width, still.height);
     for (pixel, radiance) in picture.pixels_mut().zip(&still.radiance) {
         *pixel = Rgb(radiance.to_array());
     }
-    picture
-        .save(path)
-        .with_context(|| format!("cannot write {}", path.display()))
-}
-
-fn write_png(still: &Still, exposure: f32, path: &Path) -> anyhow::Result<()> {
-    let mut picture = RgbImage::new(still.width, still.height);
-    for (pixel, radiance) in picture.pixels_mut().zip(&still.radiance) {
-        *pixel = Rgb(tone_map(*radiance, exposure));
-    }
-    picture
-        .save(path)
-        .with_context(|| format!("cannot write {}", path.display()))
+    picture.save(path)
 }
 
 #[cfg(test)]

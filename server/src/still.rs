@@ -4,8 +4,10 @@
 use std::time::Duration;
 
 use glam::{Mat3, Quat, Vec3};
+use image::{Rgb, RgbImage};
 use shadecast_protocol::{Fov, Pose};
 use shadecast_shaders::light::{STILL_SOURCE, StillParameters, rows_of_affine};
+use shadecast_shaders::picture::displayed as tone_map;
 use wgpu::ShaderStages;
 
 use crate::{
@@ -49,6 +51,16 @@ pub struct Still {
 }
 
 impl Still {
+    /// The picture as it is displayed: exposure, tone curve, sRGB.
+    #[must_use]
+    pub fn displayed(&self, exposure: f32) -> RgbImage {
+        let mut picture = RgbImage::new(self.width, self.height);
+        for (pixel, radiance) in picture.pixels_mut().zip(&self.radiance) {
+            *pixel = Rgb(tone_map(*radiance, exposure));
+        }
+        picture
+    }
+
     /// The exposure that shows it at a middling brightness.
     #[must_use]
     pub fn automatic_exposure(&self) -> f32 {

@@ -9,8 +9,8 @@ use shadecast_client::{
     SessionConfig as ClientConfig,
 };
 use shadecast_protocol::{
-    ClientTime, ClockReply, Codec, EyeView, Fov, FrameId, Pose, Secret, ServerTime, Sky, ToClient,
-    ToServer, Welcome,
+    ClientTime, ClockReply, Codec, EyeView, Fov, FrameId, Motion, Pose, Secret, ServerTime, Sky,
+    ToClient, ToServer, Welcome,
 };
 use shadecast_server::{
     Frame, Gpu, GpuScene, Pipeline, Session as Server, SessionConfig as ServerConfig,
@@ -299,17 +299,15 @@ impl Loopback {
 
     fn view(&self) -> HeadView {
         let seconds = self.now.as_secs_f32();
-        let head_in_play = head_at(seconds);
-        // Both velocities by central differences, as a tracker would report them.
-        let (before, after) = (head_at(seconds - 0.005), head_at(seconds + 0.005));
-        let turn = after.orientation * before.orientation.conjugate();
-        let world_from_play = self.spawn.orientation;
+        // Velocities by central differences, as a tracker would report them.
+        let ends = [seconds - 0.005, seconds + 0.005].map(head_at);
+        let head = Motion::along(head_at(seconds), ends, 0.01).seen_from(self.spawn);
         HeadView {
             sampled_at: self.client_time(),
             display_at: ClientTime(self.client_time().0 + VIEW_PERIOD.as_nanos() as u64),
-            world_from_head: self.spawn.then(head_in_play),
-            linear_velocity: world_from_play * (after.position - before.position) / 0.01,
-            angular_velocity: world_from_play * turn.to_scaled_axis() / 0.01,
+            world_from_head: head.pose,
+            linear_velocity: head.linear_velocity,
+            angular_velocity: head.angular_velocity,
             eyes: [-0.032, 0.032].map(|x| EyeView {
                 head_from_eye: Pose {
                     position: Vec3::X * x,

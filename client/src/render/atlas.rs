@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::cover::cover_pipeline;
+use super::cover::{cover_pass, cover_pipeline};
 use super::pipelines::Layouts;
 use crate::{ClientFrame, MaskAtlas, YuvPicture};
 
@@ -206,20 +206,7 @@ fn convert(
         write_plane(queue, plane, bytes);
     }
     let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-        label: Some("RGB from YUV"),
-        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-            view: &textures.drawn,
-            depth_slice: None,
-            resolve_target: None,
-            ops: wgpu::Operations {
-                // Every texel is written.
-                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                store: wgpu::StoreOp::Store,
-            },
-        })],
-        ..wgpu::RenderPassDescriptor::default()
-    });
+    let mut pass = cover_pass(&mut encoder, "RGB from YUV", &textures.drawn);
     pass.set_pipeline(pipeline);
     pass.set_bind_group(0, &textures.convert_group, &[]);
     pass.draw(0..3, 0..1);

@@ -1,4 +1,4 @@
-//! Pipelines that cover a whole picture with one triangle.
+//! Pipelines and passes that cover a whole picture with one triangle.
 
 /// Draws `fragment` of `module` over every pixel, from the module's vertex
 /// entry `cover`; without a layout the module's own bindings make it. `constants`
@@ -34,5 +34,26 @@ pub(super) fn cover_pipeline(
         multisample: wgpu::MultisampleState::default(),
         multiview_mask: None,
         cache: None,
+    })
+}
+
+/// Begins a pass that writes every pixel of `target`.
+pub(super) fn cover_pass<'a>(
+    encoder: &'a mut wgpu::CommandEncoder,
+    label: &str,
+    target: &wgpu::TextureView,
+) -> wgpu::RenderPass<'a> {
+    encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+        label: Some(label),
+        color_attachments: &[Some(wgpu::RenderPassColorAttachment {
+            view: target,
+            depth_slice: None,
+            resolve_target: None,
+            ops: wgpu::Operations {
+                load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
+                store: wgpu::StoreOp::Store,
+            },
+        })],
+        ..wgpu::RenderPassDescriptor::default()
     })
 }

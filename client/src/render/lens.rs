@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::EyeImages;
-use super::cover::cover_pipeline;
+use super::cover::{cover_pass, cover_pipeline};
 
 /// Radial distortion of a pair of lenses.
 ///
@@ -176,19 +176,7 @@ impl LensPass {
         target: &wgpu::TextureView,
         viewports: [Viewport; 2],
     ) {
-        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-            label: Some("lens"),
-            color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                view: target,
-                depth_slice: None,
-                resolve_target: None,
-                ops: wgpu::Operations {
-                    load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                    store: wgpu::StoreOp::Store,
-                },
-            })],
-            ..wgpu::RenderPassDescriptor::default()
-        });
+        let mut pass = cover_pass(encoder, "lens", target);
         pass.set_pipeline(&self.pipeline);
         let [x, y] = self.profile.centre;
         for ((eye, centre), view) in self.eyes.iter().zip([[x, y], [-x, y]]).zip(viewports) {

@@ -3,7 +3,10 @@
 //! Multisampling would be cheaper, but software drivers get its resolve into
 //! layers and its centroids wrong, and then atlas lookups leave their blocks.
 
-use super::{EyeImages, cover::cover_pipeline};
+use super::{
+    EyeImages,
+    cover::{cover_pass, cover_pipeline},
+};
 
 /// Pictures twice as large as the eyes, and the pass that shrinks them.
 #[derive(Debug)]
@@ -56,19 +59,7 @@ impl Shrink {
     /// Shrinks both eyes into `target`.
     pub(super) fn draw(&self, encoder: &mut wgpu::CommandEncoder, target: &EyeImages) {
         for (group, view) in self.groups.iter().zip(target.layers()) {
-            let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
-                label: Some("shrink"),
-                color_attachments: &[Some(wgpu::RenderPassColorAttachment {
-                    view,
-                    depth_slice: None,
-                    resolve_target: None,
-                    ops: wgpu::Operations {
-                        load: wgpu::LoadOp::Clear(wgpu::Color::BLACK),
-                        store: wgpu::StoreOp::Store,
-                    },
-                })],
-                ..wgpu::RenderPassDescriptor::default()
-            });
+            let mut pass = cover_pass(encoder, "shrink", view);
             pass.set_pipeline(&self.pipeline);
             pass.set_bind_group(0, group, &[]);
             pass.draw(0..3, 0..1);

@@ -7,12 +7,10 @@
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
-use glam::Vec3;
-use image::{Rgb, RgbImage};
+use image::RgbImage;
 use shadecast_server::{
     scene::Scene,
     still::{Camera, DEFAULT_BOUNCES, Film, Still, StillRenderer},
-    tone_map,
 };
 
 use crate::{MetricError, mean_squared_error};
@@ -55,18 +53,16 @@ pub(super) fn render(
         films.push([film()?, film()?]);
     }
     let began = Instant::now();
+    let time = deadline.map(|deadline| deadline.saturating_duration_since(began));
     let mut rounds = Rounds::default();
-    while rounds.go_on(deadline.map(|deadline| deadline.saturating_duration_since(began))) {
+    while rounds.go_on(time) {
         for (index, (view, halves)) in (0..).zip(views.iter().zip(&mut films)) {
             for (half, film) in (0..).zip(halves) {
                 let seed = seed.wrapping_add(2 * index + half);
                 renderer.expose(film, &view.camera, view.scene_time, SAMPLES_A_ROUND, seed)?;
             }
             let of_round = (index + 1) as f32 / views.len() as f32;
-            progress(rounds.share(
-                of_round,
-                deadline.map(|deadline| deadline.saturating_duration_since(began)),
-            ));
+            progress(rounds.share(of_round, time));
         }
         rounds.done(began.elapsed());
     }
@@ -127,15 +123,14 @@ pub(super) struct Reference {
 
 impl Reference {
     fn new([one, other]: &[Still; 2], exposure: f32) -> Self {
-        let mean = one
-            .radiance
-            .iter()
-            .zip(&other.radiance)
-            .map(|(a, b)| (*a + *b) * 0.5);
+        let pairs = one.radiance.iter().zip(&other.radiance);
+        let mean = Still {
+            radiance: pairs.map(|(a, b)| (*a + *b) * 0.5).collect(),
+            ..*one
+        };
         Self {
-            picture: tone_mapped(one.width, mean, exposure),
-            halves: [one, other]
-                .map(|still| tone_mapped(still.width, still.radiance.iter().copied(), exposure)),
+            picture: mean.displayed(exposure),
+            halves: [one, other].map(|still| still.displayed(exposure)),
         }
     }
 
@@ -146,21 +141,10 @@ impl Reference {
     }
 }
 
-fn tone_mapped(
-    width: u32,
-    radiance: impl ExactSizeIterator<Item = Vec3>,
-    exposure: f32,
-) -> RgbImage {
-    let height = radiance.len() as u32 / width.max(1);
-    let mut picture = RgbImage::new(width, height);
-    for (pixel, radiance) in picture.pixels_mut().zip(radiance) {
-        *pixel = Rgb(tone_map(radiance, exposure));
-    }
-    picture
-}
-
 #[cfg(test)]
 mod tests {
+    use image::Rgb;
+
     use super::*;
 
     #[test]

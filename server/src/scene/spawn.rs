@@ -6,7 +6,7 @@ use shadecast_protocol::Pose;
 use super::Scene;
 
 /// Height of a standing viewer's eyes, metres.
-const EYE_HEIGHT: f32 = 1.6;
+pub(super) const EYE_HEIGHT: f32 = 1.6;
 /// A scene smaller than this is an object, metres.
 const ROOM: f32 = 4.0;
 

@@ -23,12 +23,12 @@ struct PathState {
     seed: u32,
     light: vec3<f32>,
     sample_index: u32,
-    // The remaining ones hold where the lobes of the first vertex are kept apart.
-    // Direct light by the diffuse lobe, over the diffuse colour.
+    // Where the lobes are kept apart: direct light of the first vertex by the
+    // diffuse lobe, over the diffuse colour.
     direct_diffuse: vec3<f32>,
     // Width of the sample per metre of the ray onwards.
     cone: f32,
-    // Direct light by the specular lobe.
+    // The same by the specular lobe.
     direct_glossy: vec3<f32>,
     // What `radiance` counts by the diffuse lobe, over the diffuse colour.
     onward_diffuse: f32,

@@ -18,11 +18,9 @@ use serde_json::{Value, json};
 use shadecast_protocol::ObjectId;
 
 use super::gltf_load::extras::{Extras, Own, Sky};
+use super::spawn::EYE_HEIGHT;
 use super::{Light, RigidObject, Scene, Triangle};
 use bin::Bin;
-
-/// From the floor to the eyes of the spawn's camera, metres.
-const EYE_HEIGHT: f32 = 1.6;
 
 /// Writes `scene` as GLB.
 ///

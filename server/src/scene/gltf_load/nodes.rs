@@ -6,10 +6,8 @@ use shadecast_protocol::{ObjectId, Pose};
 
 use super::LoadError;
 use super::animation::Motions;
+use crate::scene::spawn::EYE_HEIGHT;
 use crate::scene::{RigidObject, Scene};
-
-/// From the eye of a standing person to the floor, metres.
-const EYE_HEIGHT: f32 = 1.6;
 
 /// A node of the scene with its place at rest.
 pub(super) struct Instance<'a> {
