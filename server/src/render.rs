@@ -44,7 +44,9 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
     let progress = status.progress("building the tree of triangles");
     let mut renderer = StillRenderer::new(&scene, arguments.bounces, &mut |share| progress(share))?;
     let progress = status.progress("rendering");
-    let mut film = renderer.film([camera.width, camera.height])?;
+    let mut film = renderer
+        .film([camera.width, camera.height])
+        .with_context(|| format!("--width {} --height {}", camera.width, camera.height))?;
     let began = Instant::now();
     let step = (PATHS_A_STEP / (camera.width * camera.height)).max(1);
     loop {

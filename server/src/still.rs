@@ -125,7 +125,7 @@ impl StillPass {
     pub fn film(&self, gpu: &Gpu, size: [u32; 2]) -> Result<Film, GpuError> {
         let bytes = u64::from(size[0]) * u64::from(size[1]) * 16;
         let parameters = gpu.uniform("still", size_of::<StillParameters>());
-        let sum = gpu.scratch("still", bytes)?;
+        let sum = gpu.scratch("still pictures", bytes)?;
         Ok(Film {
             size,
             samples: 0,
