@@ -104,7 +104,7 @@ pub(crate) struct RenderArguments {
     /// Seed of all random choices: the same seed on the same driver gives the same picture
     #[arg(long, default_value_t = 1)]
     pub(crate) seed: u32,
-    /// Light from all around instead of the scene's sky: none, or const:R,G,B (radiance)
+    /// Light from all around instead of the scene's sky: none, const:R,G,B (radiance), or an equirectangular .hdr or .exr file (+X in its middle, +Z to the right of it)
     #[arg(long, value_parser = environment)]
     pub(crate) env: Option<Environment>,
     /// A sun instead of the scene's directional lights: the direction that it shines along, and its irradiance
@@ -116,12 +116,14 @@ pub(crate) struct RenderArguments {
 }
 
 /// What lights a scene from all around.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Environment {
     /// Nothing.
     None,
     /// The same radiance everywhere.
     Constant(Vec3),
+    /// What a picture shows.
+    Picture(PathBuf),
 }
 
 #[derive(Debug, Args)]
@@ -215,7 +217,14 @@ fn environment(text: &str) -> Result<Environment, String> {
         return Ok(Environment::None);
     }
     let Some(radiance) = text.strip_prefix("const:") else {
-        return Err("none or const:R,G,B is expected".to_owned());
+        let path = PathBuf::from(text);
+        let extension = path.extension().map(std::ffi::OsStr::to_ascii_lowercase);
+        return match extension.as_deref().and_then(std::ffi::OsStr::to_str) {
+            Some("hdr" | "exr") => Ok(Environment::Picture(path)),
+            _ => {
+                Err("none, const:R,G,B or a file that ends in .hdr or .exr is expected".to_owned())
+            }
+        };
     };
     let radiance = numbers::<3>(radiance)?;
     if radiance
@@ -324,6 +333,7 @@ mod tests {
             "--env const:1,1",
             "--env const:-1,1,1",
             "--env sky",
+            "--env sky.png",
             "--fovy 180",
             "--fovy nan",
             "--spp 0",

@@ -18,7 +18,7 @@ pub mod still;
 mod visibility;
 
 pub use frame::{Frame, FrameError, FrameOrder, FrameStats, Pipeline, Stages};
-pub use gpu::{Gpu, GpuError, GpuScene};
+pub use gpu::{Gpu, GpuError, GpuScene, Integrator};
 pub use session::{Input, Output, Session, SessionConfig};
 pub use shadecast_shaders::picture::displayed as tone_map;
 pub use visibility::Prediction;

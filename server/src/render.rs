@@ -10,7 +10,8 @@ use glam::{DMat3, DQuat, DVec3};
 use image::{ImageResult, Rgb, Rgb32FImage};
 use shadecast_protocol::{Fov, Pose};
 use shadecast_server::{
-    scene::{Light, Scene, SkyModel},
+    Integrator,
+    scene::{EnvironmentMap, Light, Scene, SkyModel},
     still::{Camera, Still, StillRenderer},
 };
 
@@ -29,7 +30,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
     let (exr, png) = outputs(&arguments.out)?;
     let fov = field_of_view(arguments)?;
     let mut scene = crate::load(&arguments.scene)?;
-    light(&mut scene, arguments);
+    light(&mut scene, arguments)?;
     let camera = Camera {
         world_from_eye: match &arguments.view {
             Some(view) => pose_from_view(view).context("--view")?,
@@ -42,7 +43,11 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let status = Status::new();
     let progress = status.progress("building the tree of triangles");
-    let mut renderer = StillRenderer::new(&scene, arguments.bounces, &mut |share| progress(share))?;
+    let mut renderer = StillRenderer::new(
+        &scene,
+        Integrator::with_bounces(arguments.bounces),
+        &mut |share| progress(share),
+    )?;
     let progress = status.progress("rendering");
     let mut film = renderer
         .film([camera.width, camera.height])
@@ -115,11 +120,16 @@ fn outputs(out: &Path) -> anyhow::Result<(Option<PathBuf>, PathBuf)> {
 }
 
 /// Replaces what the command line replaces.
-fn light(scene: &mut Scene, arguments: &RenderArguments) {
-    match arguments.env {
+fn light(scene: &mut Scene, arguments: &RenderArguments) -> anyhow::Result<()> {
+    match &arguments.env {
         None => {}
         Some(Environment::None) => scene.sky = SkyModel::BLACK,
-        Some(Environment::Constant(radiance)) => scene.sky = SkyModel::constant(radiance),
+        Some(Environment::Constant(radiance)) => scene.sky = SkyModel::constant(*radiance),
+        Some(Environment::Picture(path)) => {
+            let map =
+                EnvironmentMap::load(path).with_context(|| format!("--env {}", path.display()))?;
+            scene.environment = Some(map.into());
+        }
     }
     if let Some([x, y, z, r, g, b]) = arguments.sun {
         scene
@@ -134,6 +144,7 @@ fn light(scene: &mut Scene, arguments: &RenderArguments) {
             });
         }
     }
+    Ok(())
 }
 
 fn field_of_view(arguments: &RenderArguments) -> anyhow::Result<Fov> {

@@ -12,7 +12,7 @@ use anyhow::Context;
 use glam::Vec3;
 use shadecast_protocol::{Codec, ServerTime, Sky, ToClient, Welcome};
 use shadecast_server::{
-    Gpu, GpuScene, Input, Output, Pipeline, Session, SessionConfig,
+    Gpu, GpuScene, Input, Integrator, Output, Pipeline, Session, SessionConfig,
     encode::OpenH264,
     patches::{self, PatchLimits},
     scene::{self, Scene},
@@ -72,9 +72,12 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
     let spawn = patched.scene.place_to_stand();
 
     let bar = status.progress("building the BVH");
-    let gpu_scene = GpuScene::new(&gpu, &patched.scene, arguments.bounces, &mut |share| {
-        bar(share)
-    })?;
+    let gpu_scene = GpuScene::new(
+        &gpu,
+        &patched.scene,
+        Integrator::with_bounces(arguments.bounces),
+        &mut |share| bar(share),
+    )?;
     if gpu_scene.texture_halvings > 0 {
         status.print(&format!(
             "note: images were halved {} times to fit the GPU",

@@ -11,7 +11,7 @@ use shadecast_shaders::picture::displayed as tone_map;
 use wgpu::ShaderStages;
 
 use crate::{
-    gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout},
+    gpu::{Binding, Gpu, GpuError, GpuScene, Integrator, bind, layout},
     light::{Ends, Paths},
     scene::Scene,
 };
@@ -267,11 +267,11 @@ impl StillRenderer {
     /// When there is no device or the scene does not fit it.
     pub fn new(
         scene: &Scene,
-        bounces: u32,
+        integrator: Integrator,
         progress: &mut dyn FnMut(f32),
     ) -> Result<Self, GpuError> {
         let gpu = Gpu::open()?;
-        let gpu_scene = GpuScene::new(&gpu, scene, bounces, progress)?;
+        let gpu_scene = GpuScene::new(&gpu, scene, integrator, progress)?;
         let pass = StillPass::new(&gpu, &gpu_scene)?;
         Ok(Self {
             gpu,

@@ -6,6 +6,7 @@ use std::{f32::consts::PI, time::Duration};
 use glam::{Quat, Vec2, Vec3, Vec4, vec3};
 use shadecast_protocol::{Fov, ObjectId, Pose};
 use shadecast_server::{
+    Integrator,
     scene::{Corner, Light, Material, Scene, SkyModel, Triangle},
     still::{Camera, StillRenderer},
 };
@@ -97,7 +98,8 @@ fn picture(scene: &Scene, eye: Vec3, forward: Vec3, bounces: u32, samples: u32) 
         width: SIDE,
         height: SIDE,
     };
-    let mut renderer = StillRenderer::new(scene, bounces, &mut |_| ()).expect("a GPU");
+    let mut renderer =
+        StillRenderer::new(scene, Integrator::with_bounces(bounces), &mut |_| ()).expect("a GPU");
     let still = renderer.render(&camera, Duration::ZERO, samples, 1);
     let radiance = still.expect("a picture").radiance;
     let sound = radiance
@@ -130,13 +132,13 @@ fn a_closed_white_room_neither_loses_nor_makes_light() {
             },
         );
         room(&mut scene, Vec3::ZERO, 3.0, white);
+        // Schlick's term reflects at grazing angles even here, and rough facets hide
+        // some of that: glTF's BSDF integrates to 0.99907, mean over a hemisphere.
+        let kept = albedo - 0.000_93;
         // Emission at 65 vertices, and what the last of them receives.
-        let sum = |albedo: f32| -> f32 { (0..=65).map(|k| 0.5 * albedo.powi(k)).sum() };
-        let found = mean(&picture(&scene, Vec3::ZERO, Vec3::NEG_Z, 64, 8));
-        // Schlick's term reflects at grazing angles even here, and what a rough facet
-        // hides of that is lost: 0.05 % a bounce.
-        assert!(found <= sum(albedo) * 1.001, "{found} of {}", sum(albedo));
-        assert!(found >= sum(albedo - 0.001), "{found} of {}", sum(albedo));
+        let sum: f32 = (0..=65).map(|k| 0.5 * kept.powi(k)).sum();
+        let found = mean(&picture(&scene, Vec3::ZERO, Vec3::NEG_Z, 64, 64));
+        assert_near(found, sum, 0.01);
     }
 }
 

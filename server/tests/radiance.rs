@@ -2,10 +2,14 @@
 
 use std::{f32::consts::PI, time::Duration};
 
-use glam::{Affine2, Quat, Vec2, Vec3, Vec4, vec2, vec3};
+use glam::{Affine2, DVec3, Quat, Vec2, Vec3, Vec4, vec2, vec3};
 use shadecast_protocol::{Fov, ObjectId, Pose};
 use shadecast_server::{
-    scene::{Corner, Image, Light, Material, Scene, SkyModel, TextureRef, Triangle, Wrap},
+    Integrator,
+    scene::{
+        Alpha, Corner, EnvironmentMap, Image, Light, Material, Scene, SkyModel, TextureRef,
+        Triangle, Wrap,
+    },
     still::{Camera, DEFAULT_BOUNCES, StillRenderer},
 };
 
@@ -51,7 +55,12 @@ fn squares(materials: Vec<Material>) -> Scene {
 }
 
 fn renderer(scene: &Scene) -> StillRenderer {
-    StillRenderer::new(scene, DEFAULT_BOUNCES, &mut |_| ()).expect("a GPU")
+    StillRenderer::new(
+        scene,
+        Integrator::with_bounces(DEFAULT_BOUNCES),
+        &mut |_| (),
+    )
+    .expect("a GPU")
 }
 
 fn middle_of(square: u32) -> Vec3 {
@@ -275,4 +284,102 @@ fn thousands_of_lamps_add_up() {
     let mut renderer = renderer(&scene);
     let expected = albedo * irradiance / PI;
     assert_near(seen(&mut renderer, 0, 0.3), Vec3::splat(expected), 0.02);
+}
+
+/// A sky with a small bright sun in it, as a picture.
+fn picture_of_a_sky() -> EnvironmentMap {
+    let (width, height) = (64, 32);
+    let pixel = |x: u32, y: u32| match (x, y) {
+        (20, 9) => vec3(900.0, 700.0, 400.0),
+        _ => Vec3::splat(0.2) + Vec3::Z * (x as f32 / 64.0) + Vec3::X * (y as f32 / 32.0),
+    };
+    let pixels = (0..height).flat_map(|y| (0..width).map(move |x| pixel(x, y)));
+    EnvironmentMap::new(width, height, pixels.collect()).expect("radiance")
+}
+
+/// The same as it is read: bilinearly between the middles of pixels.
+fn seen_in(map: &EnvironmentMap, direction: Vec3) -> Vec3 {
+    let [width, height] = map.size().map(|side| side as i32);
+    let p = EnvironmentMap::uv(direction) * vec2(width as f32, height as f32) - 0.5;
+    let (low, f) = (p.floor(), p - p.floor());
+    let pixel = |x: i32, y: i32| {
+        let (x, y) = (x.rem_euclid(width), y.clamp(0, height - 1));
+        map.pixels()[(y * width + x) as usize]
+    };
+    let row = |y: i32| pixel(low.x as i32, y).lerp(pixel(low.x as i32 + 1, y), f.x);
+    row(low.y as i32).lerp(row(low.y as i32 + 1), f.y)
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_picture_of_the_sky_lights_as_the_integral_over_it() {
+    let albedo = 0.5;
+    let mut scene = squares(vec![matte(Vec3::splat(albedo)), metal(0.0)]);
+    let map = picture_of_a_sky();
+    // Over the hemisphere about +Z, in steps of a twentieth of a pixel.
+    let steps = 1280_u32;
+    let mut irradiance = DVec3::ZERO;
+    for i in 0..steps / 2 {
+        let polar = (f64::from(i) + 0.5) * std::f64::consts::PI / f64::from(steps);
+        for j in 0..steps {
+            let turn = (f64::from(j) + 0.5) * std::f64::consts::TAU / f64::from(steps);
+            let (sine, cosine) = polar.sin_cos();
+            let direction = DVec3::new(turn.cos() * sine, turn.sin() * sine, cosine).as_vec3();
+            irradiance += seen_in(&map, direction).as_dvec3() * (sine * cosine);
+        }
+    }
+    irradiance *= 2.0 * std::f64::consts::PI.powi(2) / f64::from(steps).powi(2);
+    let expected = irradiance.as_vec3() * albedo / PI;
+    let mirrored = Quat::from_rotation_x(0.6) * Vec3::Z;
+    let in_mirror = seen_in(&map, mirrored);
+    scene.environment = Some(map.into());
+    for bounces in [0, 1] {
+        let integrator = Integrator::with_bounces(bounces);
+        let renderer = StillRenderer::new(&scene, integrator, &mut |_| ());
+        let mut renderer = renderer.expect("a GPU");
+        assert_near(seen(&mut renderer, 0, 0.3), expected, 0.01);
+        // The picture spans a tenth of a radian, a pixel of the sky as much.
+        assert_near(seen(&mut renderer, 1, 0.6), in_mirror, 0.03);
+    }
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn blended_surfaces_hide_as_much_as_alpha_says() {
+    // One veil above a square, seen through it and lit through it.
+    let alpha = 0.25;
+    let veil = Material {
+        base_color: Vec4::new(0.0, 0.0, 0.0, alpha),
+        emissive: Vec3::splat(0.4),
+        alpha: Alpha::Blend,
+        double_sided: true,
+        ..matte(Vec3::ZERO)
+    };
+    let mut scene = squares(vec![matte(Vec3::splat(0.8))]);
+    scene.materials.push(veil);
+    for index in 0..4 {
+        let position = (scene.positions[index] * 3.0).with_z(1.0);
+        scene.positions.push(position);
+    }
+    for index in 0..2 {
+        let mut triangle = scene.triangles[index];
+        triangle.material = 1;
+        triangle.positions = triangle.positions.map(|position| position + 4);
+        scene.triangles.push(triangle);
+    }
+    scene.lights = vec![Light::Directional {
+        direction: Vec3::NEG_Z,
+        irradiance: Vec3::splat(PI),
+        angular_radius: 0.0,
+    }];
+    // The veil fills nearly all of the hemisphere: its form factor from the middle of
+    // the square, two triangles of six metres a metre above it.
+    let x = 3.0_f32;
+    let root = (1.0 + x * x).sqrt();
+    let form_factor = 4.0 * (2.0 * x / root * (x / root).atan()) / (2.0 * PI);
+    let through = 1.0 - alpha;
+    let ground = 0.8 * (through + alpha * 0.4 * form_factor);
+    let expected = alpha * 0.4 + through * ground;
+    let mut renderer = renderer(&scene);
+    assert_near(seen(&mut renderer, 0, 0.0), Vec3::splat(expected), 0.01);
 }

@@ -8,7 +8,7 @@ use shadecast_protocol::{
     ClientTime, EyeView, Fov, FrameId, PatchId, Pose, UpdateTiming, ViewReport, ViewSeq,
 };
 use shadecast_server::{
-    Frame, FrameOrder, Gpu, GpuScene, Pipeline, Prediction,
+    Frame, FrameOrder, Gpu, GpuScene, Integrator, Pipeline, Prediction,
     encode::OpenH264,
     patches::{self, PatchLimits, PatchedScene},
     scene::courtyard,
@@ -97,7 +97,8 @@ fn view(world_from_head: Pose) -> ViewReport {
 
 fn first_frame(scene: &PatchedScene, prediction: &Prediction) -> Frame {
     let gpu = Gpu::open().expect("a GPU");
-    let gpu_scene = GpuScene::new(&gpu, &scene.scene, 1, &mut |_| ()).expect("it fits");
+    let gpu_scene = GpuScene::new(&gpu, &scene.scene, Integrator::with_bounces(1), &mut |_| ())
+        .expect("it fits");
     let encoder = OpenH264::new(4_000_000, 30.0).expect("an encoder");
     let mut pipeline = Pipeline::new(
         gpu,

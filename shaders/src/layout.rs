@@ -84,8 +84,8 @@ fn layouts_match() {
         sun_irradiance,
         bounces,
         faint,
-        spare,
-        padding
+        environment_cell,
+        environment_size
     );
     same_layout!(
         &atlas,
@@ -129,6 +129,14 @@ fn layouts_match() {
         cos_inner,
         area,
         spare
+    );
+    same_layout!(
+        &atlas,
+        EnvironmentCell,
+        threshold,
+        otherwise,
+        density,
+        padding
     );
     same_layout!(
         &atlas, LightNode, centre, radius, axis, cos_spread, power, child, padding

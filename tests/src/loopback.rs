@@ -13,7 +13,7 @@ use shadecast_protocol::{
     ToClient, ToServer, Welcome,
 };
 use shadecast_server::{
-    Frame, Gpu, GpuScene, Pipeline, Session as Server, SessionConfig as ServerConfig,
+    Frame, Gpu, GpuScene, Integrator, Pipeline, Session as Server, SessionConfig as ServerConfig,
     encode::OpenH264,
     patches::{self, PatchLimits},
     scene::Scene,
@@ -74,7 +74,12 @@ impl Loopback {
         let patched = patches::cut(scene, PatchLimits::for_atlas(SUPERBLOCK, 165.0));
         let spawn = patched.scene.spawn.unwrap_or(Pose::IDENTITY);
         let gpu = Gpu::open()?;
-        let gpu_scene = GpuScene::new(&gpu, &patched.scene, 1, &mut |_| ())?;
+        let gpu_scene = GpuScene::new(
+            &gpu,
+            &patched.scene,
+            Integrator::with_bounces(1),
+            &mut |_| (),
+        )?;
         let encoder = OpenH264::new(4_000_000, 30.0)?;
         let pipeline = Pipeline::new(
             gpu,

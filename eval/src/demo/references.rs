@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 use image::RgbImage;
 use shadecast_server::{
+    Integrator,
     scene::Scene,
     still::{Camera, DEFAULT_BOUNCES, Film, Still, StillRenderer},
 };
@@ -45,8 +46,12 @@ pub(super) fn render(
     deadline: Option<Instant>,
     progress: impl Fn(f32),
 ) -> Result<(Vec<Reference>, u32)> {
-    let mut renderer = StillRenderer::new(scene, DEFAULT_BOUNCES, &mut |_| ())
-        .context("cannot render references")?;
+    let mut renderer = StillRenderer::new(
+        scene,
+        Integrator::with_bounces(DEFAULT_BOUNCES),
+        &mut |_| (),
+    )
+    .context("cannot render references")?;
     let mut films = Vec::with_capacity(views.len());
     for View { camera, .. } in views {
         let film = || renderer.film([camera.width, camera.height]);

@@ -5,10 +5,10 @@ mod scene;
 use thiserror::Error;
 use wgpu::util::DeviceExt;
 
-pub use scene::GpuScene;
+pub use scene::{GpuScene, Integrator};
 
 /// Storage buffers that the light kernels bind at once.
-const STORAGE_BUFFERS: u32 = 23;
+const STORAGE_BUFFERS: u32 = 25;
 
 /// Why there is no usable GPU.
 #[derive(Debug, Error)]

@@ -1,5 +1,6 @@
 //! The scene as the kernels read it: trees, triangles, materials, texels and lamps.
 
+mod environment;
 mod lamps;
 mod light_tree;
 mod materials;
@@ -12,6 +13,7 @@ use shadecast_shaders::light::{Globals, Instance};
 use wgpu::ShaderStages;
 
 use self::{
+    environment::Environment,
     lamps::Lamps,
     light_tree::LightTree,
     materials::material_records,
@@ -19,7 +21,7 @@ use self::{
     trees::{Trees, transforms},
 };
 use super::{Binding, Gpu, GpuError, bind, layout};
-use crate::scene::{Alpha, Scene};
+use crate::scene::{Scene, SceneFacts};
 
 /// Where the object begins in a triangle's last word, above its material.
 const OBJECT_SHIFT: u32 = 20;
@@ -29,6 +31,36 @@ const FAINT_SHARE: f32 = 0.01;
 /// Largest share of the largest binding that texels may take; images are
 /// halved until they fit.
 const TEXEL_SHARE: f64 = 0.9;
+
+/// How light is found. Whatever is switched off, the light is the same and the
+/// noise is not: that is how `shadecast-eval` tells what each part is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Integrator {
+    /// Indirect bounces; 0 is emission and direct light only.
+    pub bounces: u32,
+    /// Lamps are chosen by what they can send, and not all alike.
+    pub light_selection: bool,
+    /// Light and BSDF samples share what both find.
+    pub multiple_importance: bool,
+    /// Points of Sobol's sequence instead of random numbers.
+    pub low_discrepancy: bool,
+    /// What the scene does not use is compiled away.
+    pub specialised: bool,
+}
+
+impl Integrator {
+    /// Everything switched on.
+    #[must_use]
+    pub fn with_bounces(bounces: u32) -> Self {
+        Self {
+            bounces,
+            light_selection: true,
+            multiple_importance: true,
+            low_discrepancy: true,
+            specialised: true,
+        }
+    }
+}
 
 /// The scene's buffers and their one bind group.
 #[derive(Debug)]
@@ -57,7 +89,7 @@ impl GpuScene {
     pub fn new(
         gpu: &Gpu,
         scene: &Scene,
-        bounces: u32,
+        integrator: Integrator,
         progress: &mut dyn FnMut(f32),
     ) -> Result<Self, GpuError> {
         let trees = Trees::build(scene, progress);
@@ -103,19 +135,32 @@ impl GpuScene {
             .collect();
         let vertices: Vec<[u32; 3]> = scene.triangles.iter().map(|t| t.positions).collect();
 
-        let any =
-            |wanted: &dyn Fn(&crate::scene::Material) -> bool| scene.materials.iter().any(wanted);
-        let constants = [
+        let environment = (scene.environment.as_ref())
+            .map(|map| Environment::of(map, limit))
+            .unwrap_or_default();
+        let facts = SceneFacts::of(scene);
+        let used = [
             ("HAS_SUN", sun.is_some()),
             ("HAS_LIGHTS", !lights.is_empty()),
-            ("HAS_SKY", !scene.sky.is_black()),
-            ("HAS_MASKS", any(&|m| matches!(m.alpha, Alpha::Mask { .. }))),
-            ("HAS_TEXTURES", !scene.images.is_empty()),
-            ("HAS_NORMAL_MAPS", any(&|m| m.normal_texture.is_some())),
-            ("HAS_MOVERS", !scene.objects.is_empty()),
-        ]
-        .map(|(name, used)| (name, f64::from(u8::from(used))))
-        .to_vec();
+            ("HAS_SKY", facts.sky),
+            ("HAS_ENVIRONMENT", scene.environment.is_some()),
+            ("HAS_MASKS", facts.alpha_mask || facts.alpha_blend),
+            ("HAS_TEXTURES", facts.textures),
+            ("HAS_NORMAL_MAPS", facts.normal_maps),
+            ("HAS_MOVERS", facts.moving_objects > 0),
+            ("HAS_NARROW_LOBES", facts.lamps_in_narrow_lobes()),
+        ];
+        let switched = [
+            ("LIGHT_SELECTION", integrator.light_selection),
+            ("MULTIPLE_IMPORTANCE", integrator.multiple_importance),
+            ("LOW_DISCREPANCY", integrator.low_discrepancy),
+        ];
+        let used = used.map(|(name, used)| (name, used || !integrator.specialised));
+        let constants = used
+            .into_iter()
+            .chain(switched)
+            .map(|(name, on)| (name, f64::from(u8::from(on))))
+            .collect();
 
         let mut globals = Globals {
             sky_zenith: scene.sky.zenith.to_array(),
@@ -124,7 +169,9 @@ impl GpuScene {
             light_count: lights.len() as u32,
             punctual_count,
             instance_count: trees.instances.len() as u32,
-            bounces,
+            bounces: integrator.bounces,
+            environment_cell: environment.cell,
+            environment_size: environment.size,
             ..Default::default()
         };
         if let Some(sun) = sun {
@@ -132,7 +179,10 @@ impl GpuScene {
             globals.sun_cos = sun.angular_radius.cos();
             globals.sun_irradiance = sun.irradiance.to_array();
         }
-        let open_sky = luminance(scene.sky.zenith + scene.sky.horizon) * 0.5;
+        let open_sky = match &scene.environment {
+            Some(map) => luminance(map.mean()),
+            None => luminance(scene.sky.zenith + scene.sky.horizon) * 0.5,
+        };
         let sunlit = luminance(Vec3::from(globals.sun_irradiance)) / std::f32::consts::PI;
         globals.faint = FAINT_SHARE * (open_sky + sunlit);
         let globals_buffer = gpu.uniform("globals", size_of::<Globals>());
@@ -152,9 +202,14 @@ impl GpuScene {
             gpu.storage("positions", bytemuck::cast_slice(&scene.positions))?,
             gpu.storage("vertices", bytemuck::cast_slice(&vertices))?,
             light_nodes.clone(),
+            gpu.storage("environment", bytemuck::cast_slice(&environment.radiance))?,
+            gpu.storage(
+                "environment cells",
+                bytemuck::cast_slice(&environment.cells),
+            )?,
         ];
         let mut bindings = vec![Binding::Uniform];
-        bindings.extend([Binding::Read; 11]);
+        bindings.extend([Binding::Read; 13]);
         let layout = layout(
             gpu,
             ShaderStages::COMPUTE | ShaderStages::VERTEX | ShaderStages::FRAGMENT,

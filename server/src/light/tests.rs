@@ -7,6 +7,7 @@ use shadecast_shaders::light::{patch_point, texel_coordinates};
 use super::*;
 use crate::{
     atlas::AtlasStats,
+    gpu::Integrator,
     patches::{self, PatchLimits, PatchedScene},
     scene::{Corner, Image, Material, Scene, TextureRef, Triangle, Wrap},
 };
@@ -103,7 +104,8 @@ fn placed(block: Block, old: Option<Block>) -> Placed {
 fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() {
     let scene = four_quarters();
     let gpu = Gpu::open().expect("a GPU");
-    let gpu_scene = GpuScene::new(&gpu, &scene.scene, 1, &mut |_| ()).expect("a scene");
+    let gpu_scene = GpuScene::new(&gpu, &scene.scene, Integrator::with_bounces(1), &mut |_| ())
+        .expect("a scene");
     let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2]).expect("an atlas");
     let schedule = Schedule::new(vec![Lasting {
         longest_history: 64.0,

@@ -7,6 +7,9 @@ use super::{Alpha, Light, Material, Scene, TextureRef};
 
 /// Below this roughness a lobe is narrow enough to be seen as a reflection.
 const GLOSSY_BELOW: f32 = 0.5;
+/// Below this GGX alpha, which is roughness squared, hardly any sample of a lamp
+/// falls into a lobe. Twin: `NARROW` in `path.wgsl`.
+const NARROW: f32 = 0.1;
 
 /// What the triangles and lights of a scene use; what none of them uses need
 /// not be built, bound, dispatched or sent.
@@ -14,7 +17,7 @@ const GLOSSY_BELOW: f32 = 0.5;
 pub struct SceneFacts {
     /// Some material is there only where its texture's alpha says so.
     pub alpha_mask: bool,
-    /// Some material would be transparent.
+    /// Some material is transparent to rays of light.
     pub alpha_blend: bool,
     /// Some material has a normal map.
     pub normal_maps: bool,
@@ -32,12 +35,14 @@ pub struct SceneFacts {
     pub suns: usize,
     /// Point and spot lights.
     pub punctual_lights: usize,
-    /// The sky radiates.
+    /// The sky radiates, be it a picture or not.
     pub sky: bool,
     /// Rigidly moving objects.
     pub moving_objects: usize,
     /// No metal, and nothing smoother than a roughness of 0.5.
     pub all_rough: bool,
+    /// Some material has a lobe that hardly any sample of a lamp falls into.
+    pub narrow_lobes: bool,
 }
 
 impl SceneFacts {
@@ -73,10 +78,21 @@ impl SceneFacts {
                 .sum(),
             suns,
             punctual_lights: scene.lights.len() - suns,
-            sky: !scene.sky.is_black(),
+            sky: scene.environment.is_some() || !scene.sky.is_black(),
             moving_objects: scene.objects.len(),
-            all_rough: used().all(|m| is_rough(m, scene)),
+            all_rough: used().all(|m| {
+                let [roughness, metal] = glossiest(m, scene);
+                roughness >= GLOSSY_BELOW && metal == 0.0
+            }),
+            narrow_lobes: used().any(|m| glossiest(m, scene)[0].powi(2) < NARROW),
         }
+    }
+
+    /// Lamps are seen in lobes that hardly any sample of a lamp falls into, and
+    /// so must be looked for there.
+    #[must_use]
+    pub fn lamps_in_narrow_lobes(&self) -> bool {
+        self.narrow_lobes && self.emissive_triangles > 0
     }
 
     /// One sentence for everything that the server leaves out of its work.
@@ -84,8 +100,8 @@ impl SceneFacts {
     pub fn left_out(&self) -> Vec<String> {
         let sentences = [
             (
-                !self.alpha_mask,
-                "no alpha masks: shadow rays never look at a texture",
+                !self.alpha_mask && !self.alpha_blend,
+                "no alpha masks or blending: rays never look at a texture on their way",
             ),
             (
                 !self.normal_maps,
@@ -128,6 +144,10 @@ impl SceneFacts {
                 self.all_rough,
                 "nothing shines: all materials are rough and no metal",
             ),
+            (
+                !self.lamps_in_narrow_lobes(),
+                "no lamp is seen in a mirror: paths send no ray beyond their last vertex",
+            ),
         ];
         let absent = sentences.into_iter().filter(|(absent, _)| *absent);
         absent.map(|(_, sentence)| sentence.to_owned()).collect()
@@ -146,8 +166,8 @@ fn textures(material: &Material) -> impl Iterator<Item = &TextureRef> {
     .flatten()
 }
 
-/// The least roughness and the most metalness anywhere on the material decide.
-fn is_rough(material: &Material, scene: &Scene) -> bool {
+/// The least roughness and the most metalness anywhere on the material.
+fn glossiest(material: &Material, scene: &Scene) -> [f32; 2] {
     let extremes = material.metallic_roughness_texture.as_ref().map(|texture| {
         let texels = scene.images[texture.image as usize].rgba.chunks_exact(4);
         let start = Vec2::new(1.0, 0.0);
@@ -156,6 +176,6 @@ fn is_rough(material: &Material, scene: &Scene) -> bool {
             Vec2::new(found.x.min(roughness), found.y.max(metal))
         })
     });
-    let extremes = extremes.unwrap_or(Vec2::ONE) * Vec2::new(material.roughness, material.metallic);
-    extremes.x >= GLOSSY_BELOW && extremes.y == 0.0
+    let extremes = extremes.unwrap_or(Vec2::ONE);
+    (extremes * Vec2::new(material.roughness, material.metallic)).to_array()
 }

@@ -6,6 +6,7 @@
 //! up, metres; colours are linear Rec.709.
 
 mod courtyard;
+mod environment;
 mod export;
 mod facts;
 mod gltf_load;
@@ -13,12 +14,13 @@ mod inspect;
 mod spawn;
 mod tangents;
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use glam::{Affine2, Vec2, Vec3, Vec4};
 use shadecast_protocol::{Motion, ObjectId, Pose};
 
 pub use courtyard::courtyard;
+pub use environment::{EnvironmentError, EnvironmentMap};
 pub use export::write_glb;
 pub use facts::SceneFacts;
 pub use gltf_load::{LoadError, load};
@@ -45,6 +47,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// What a ray meets that meets nothing.
     pub sky: SkyModel,
+    /// What it meets in place of the sky; only where this is asked for beside the file.
+    pub environment: Option<Arc<EnvironmentMap>>,
     /// Rigidly moving objects; `ObjectId(n)` is `objects[n - 1]`.
     pub objects: Vec<RigidObject>,
     /// Where the middle of the play space stands: floor level, facing -Z.
@@ -144,7 +148,8 @@ pub enum Alpha {
         /// The cutoff.
         cutoff: f32,
     },
-    /// Parsed, not yet drawn as transparent: treated as opaque.
+    /// Each ray of light finds as much of it there as alpha says; a headset
+    /// draws it as if opaque.
     Blend,
 }
 

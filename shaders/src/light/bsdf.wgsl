@@ -69,7 +69,10 @@ fn specular_share(s: Surface, cos_o: f32) -> f32 {
     let metal = luminance(s.base) * (1.0 - f) + f;
     let specular = mix(dielectric, metal, s.metallic);
     let diffuse = (1.0 - s.metallic) * luminance(s.base) * (1.0 - dielectric);
-    return clamp(specular / max(specular + diffuse, 1e-6), 0.1, select(0.9, 1.0, s.metallic > 0.999));
+    // No lobe that there is goes without samples, and none that is not gets any:
+    // wasted samples would multiply the weight of all others at each bounce.
+    let least = min(vec2<f32>(specular, diffuse) * 2.5, vec2<f32>(0.1));
+    return clamp(specular / max(specular + diffuse, 1e-6), least.x, 1.0 - least.y);
 }
 
 // The BSDF times the cosine, lobe by lobe.

@@ -67,6 +67,10 @@ struct LampChoice {
 
 // One of the lamps, by what it can send to a point.
 fn choose_lamp(p: vec3<f32>, n: vec3<f32>, u_in: f32) -> LampChoice {
+    if (!LIGHT_SELECTION) {
+        let count = f32(globals.light_count);
+        return LampChoice(min(u32(u_in * count), globals.light_count - 1u), 1.0 / count);
+    }
     var u = u_in;
     var probability = 1.0;
     var child = light_nodes[0].child;
@@ -87,6 +91,9 @@ fn choose_lamp(p: vec3<f32>, n: vec3<f32>, u_in: f32) -> LampChoice {
 
 // Probability with which `choose_lamp` finds the light at the end of a trail.
 fn probability_of(trail: u32, p: vec3<f32>, n: vec3<f32>) -> f32 {
+    if (!LIGHT_SELECTION) {
+        return 1.0 / f32(globals.light_count);
+    }
     var probability = 1.0;
     var rest = trail;
     var child = light_nodes[0].child;
@@ -120,8 +127,14 @@ fn lamp_density(triangle: u32, p: vec3<f32>, n: vec3<f32>) -> f32 {
     return probability_of(lights[low].trail, p, n) / lights[low].area;
 }
 
+// What a sample of density `pdf` counts where another technique finds the same
+// light with density `other`: the balance heuristic.
+fn shared_weight(pdf: f32, other: f32) -> f32 {
+    return pdf / (pdf + other);
+}
+
 // Light from one of the lamps. With `with_bsdf_rays`, emissive triangles are
-// also met by BSDF samples and the two share by the balance heuristic.
+// also met by BSDF samples.
 fn lamp_sample(s: Surface, wo: vec3<f32>, u_choice: f32, u: vec2<f32>, with_bsdf_rays: bool) -> LightSample {
     let origin = offset_origin(s);
     let choice = choose_lamp(origin, s.ns, u_choice);
@@ -179,10 +192,39 @@ fn lamp_sample(s: Surface, wo: vec3<f32>, u_choice: f32, u: vec2<f32>, with_bsdf
             + corners[record.y * 3u + 2u] * b.x + corners[record.z * 3u + 2u] * b.y;
         emission *= texture_at(material.textures[3], uv.xy, uv.zw, 0.0).rgb;
     }
+    if (HAS_MASKS && material.alpha_cutoff >= 0.0) {
+        emission *= opacity(light.triangle, b);
+    }
     let pdf = choice.probability / light.area * distance * distance / cosine;
     let bsdf = evaluate_bsdf(s, wo, wi);
-    let weight = select(1.0, pdf / (pdf + bsdf.pdf), with_bsdf_rays);
+    let weight = select(1.0, shared_weight(pdf, bsdf.pdf), with_bsdf_rays && MULTIPLE_IMPORTANCE);
     return LightSample(wi, distance, emission * (weight / pdf), bsdf);
+}
+
+// Light from the picture of all directions. With `with_bsdf_rays` as above.
+fn environment_sample(s: Surface, wo: vec3<f32>, u_cell: vec2<f32>, u: vec2<f32>, with_bsdf_rays: bool) -> LightSample {
+    let found = sample_environment(u_cell, u);
+    let bsdf = evaluate_bsdf(s, wo, found.direction);
+    let weight = select(1.0, shared_weight(found.density, bsdf.pdf), with_bsdf_rays && MULTIPLE_IMPORTANCE);
+    return LightSample(found.direction, INFINITE, sky_radiance(found.direction) * (weight / found.density), bsdf);
+}
+
+// What the sky sends along a ray that the BSDF chose.
+fn sky_by_bsdf(direction: vec3<f32>, pdf: f32) -> vec3<f32> {
+    let other = environment_density(direction);
+    let share = select(select(1.0, 0.0, other > 0.0), shared_weight(pdf, other), MULTIPLE_IMPORTANCE);
+    // A camera's ray has no density: nothing else finds what it finds.
+    return sky_radiance(direction) * select(1.0, share, pdf > 0.0);
+}
+
+// The same by a shadow ray, at a vertex that sends no other.
+fn sky_sample(s: Surface, wo: vec3<f32>, u: vec2<f32>, u_lobe: f32) -> LightSample {
+    let wi = sample_bsdf(s, wo, u, u_lobe);
+    let bsdf = evaluate_bsdf(s, wo, wi);
+    if (bsdf.pdf <= 0.0) {
+        return NO_LIGHT;
+    }
+    return LightSample(wi, INFINITE, sky_by_bsdf(wi, bsdf.pdf) / bsdf.pdf, bsdf);
 }
 
 // Adds a candidate to a reservoir of one.
@@ -203,19 +245,23 @@ fn consider(s: Surface, chosen: ptr<function, LightSample>, total: ptr<function,
     *u = clamp(*u, 0.0, 0.99999994);
 }
 
-fn light_sample(s: Surface, wo: vec3<f32>, last: bool, rng: ptr<function, Sampler>) -> LightSample {
+// Direct light but for the sun's: one candidate of each kind, and one of them by
+// what it would bring. With `with_bsdf_rays` a ray onwards follows.
+fn light_sample(s: Surface, wo: vec3<f32>, with_bsdf_rays: bool, rng: ptr<function, Sampler>) -> LightSample {
     var chosen = NO_LIGHT;
     var total = 0.0;
     let choice = sample_2d(rng);
     var u = choice.x;
-    if (HAS_SKY && last) {
-        let wi = to_world(frame_around(s.ns), cosine_hemisphere(sample_2d(rng)));
-        let cosine = max(dot(s.ns, wi), 1e-6);
-        consider(s, &chosen, &total, &u,
-            LightSample(wi, INFINITE, sky_radiance(wi) * (PI / cosine), evaluate_bsdf(s, wo, wi)));
+    if (HAS_SKY && !with_bsdf_rays) {
+        let u_sky = sample_2d(rng);
+        consider(s, &chosen, &total, &u, sky_sample(s, wo, u_sky, sample_2d(rng).x));
+    }
+    if (has_picture()) {
+        let u_cell = sample_2d(rng);
+        consider(s, &chosen, &total, &u, environment_sample(s, wo, u_cell, sample_2d(rng), true));
     }
     if (HAS_LIGHTS) {
-        consider(s, &chosen, &total, &u, lamp_sample(s, wo, choice.y, sample_2d(rng), !last));
+        consider(s, &chosen, &total, &u, lamp_sample(s, wo, choice.y, sample_2d(rng), with_bsdf_rays));
     }
     let weight = luminance(both_lobes(s, chosen.bsdf) * chosen.incoming);
     if (weight > 0.0) {

@@ -2,6 +2,7 @@
 
 mod atlas;
 mod carry;
+mod environment;
 mod path;
 mod sampler;
 mod scene;
@@ -9,11 +10,12 @@ mod still;
 
 pub use atlas::{BlockRecord, LightParameters, PatchPoint, patch_point, texel_coordinates};
 pub use carry::{CarryParameters, Move, NO_BLOCK};
+pub use environment::EnvironmentCell;
 pub use path::{HIT_BYTES, RAY_BYTES, STATE_BYTES, Wave};
 pub use sampler::Sampler;
 pub use scene::{
-    Globals, Instance, LIGHT_LEAF, LightNode, LightRecord, Material, NO_TEXTURE, TextureRecord,
-    rows_of_affine,
+    BLENDED, Globals, Instance, LIGHT_LEAF, LightNode, LightRecord, Material, NO_TEXTURE,
+    TextureRecord, rows_of_affine,
 };
 pub use still::StillParameters;
 
@@ -22,6 +24,7 @@ macro_rules! path_source {
     ($($entry:literal),*) => {
         concat!(
             include_str!("scene.wgsl"),
+            include_str!("environment.wgsl"),
             include_str!("trace.wgsl"),
             include_str!("sampler.wgsl"),
             include_str!("bsdf.wgsl"),

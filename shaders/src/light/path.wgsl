@@ -6,7 +6,8 @@
 // where it shines and is nothing in the shade, which no choice by unshadowed
 // contribution can know. All other lights share one, chosen so. The sky is met
 // by the rays that leave the scene, and at the last vertex, which sends none,
-// by a shadow ray.
+// by a shadow ray. Where the last vertex has a narrow lobe it does send a ray,
+// for what shines only: hardly any light sample falls into such a lobe.
 
 struct PathState {
     // From the first vertex on, where its lobes are kept apart; else from the camera.
@@ -55,7 +56,13 @@ const SLOT_ONWARDS: u32 = 2u;
 // Dimension pairs that the start of a path draws.
 const PAIRS_AT_START: u32 = 2u;
 // Dimension pairs that one vertex may draw.
-const PAIRS_PER_VERTEX: u32 = 8u;
+const PAIRS_PER_VERTEX: u32 = 12u;
+
+// Below this GGX alpha a lobe is narrow. Twin: SceneFacts.
+const NARROW: f32 = 0.1;
+// First vertex at which a path may end by chance, and the least chance to go on.
+const FIRST_ROULETTE: u32 = 3u;
+const LEAST_TO_GO_ON: f32 = 0.05;
 
 // Share of the faintest contributions that still get a shadow ray.
 const LEAST_SURVIVAL: f32 = 0.1;
@@ -76,7 +83,7 @@ fn send_nothing(path: u32, slot: u32) {
 // Sends the rays of a vertex: what light it gets, and where the path goes on.
 fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, state_in: PathState) {
     var state = state_in;
-    let last = vertex >= globals.bounces;
+    let sends_onwards = vertex < globals.bounces || (HAS_NARROW_LOBES && s.alpha < NARROW);
     let apart = vertex == 0u && (state.progress & LOBES_APART) != 0u;
     var rng = Sampler(state.sample_index, state.seed, PAIRS_AT_START + vertex * PAIRS_PER_VERTEX);
     let origin = offset_origin(s);
@@ -90,7 +97,7 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
         send_nothing(path, SLOT_SUN);
     }
 
-    let light = light_sample(s, wo, last, &rng);
+    let light = light_sample(s, wo, sends_onwards, &rng);
     // Russian roulette on what would hardly be seen.
     let worth = luminance(state.throughput * both_lobes(s, light.bsdf) * light.incoming) / globals.faint;
     let survival = clamp(worth, LEAST_SURVIVAL, 1.0);
@@ -101,12 +108,22 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
     // Short of the lamp by a few rounding steps.
     send(path, SLOT_LIGHT, origin, light.direction, select(-1.0, light.distance * 0.9999, goes), step);
 
-    var onwards = false;
-    if (!last) {
+    if (vertex >= FIRST_ROULETTE) {
+        // Chance by what the path still carries: white walls go on for ever, grey ones do not.
+        let carried = max(max(state.throughput.x, state.throughput.y), state.throughput.z);
+        let goes_on = clamp(carried, LEAST_TO_GO_ON, 1.0);
+        if (goes_on < 1.0 && sample_2d(&rng).x >= goes_on) {
+            send_nothing(path, SLOT_ONWARDS);
+            paths[path] = state;
+            return;
+        }
+        state.throughput /= goes_on;
+    }
+    if (sends_onwards) {
         let u = sample_2d(&rng);
         let wi = sample_bsdf(s, wo, u, sample_2d(&rng).x);
         let bsdf = evaluate_bsdf(s, wo, wi);
-        onwards = any(wi != vec3<f32>(0.0)) && bsdf.pdf > 0.0;
+        let onwards = any(wi != vec3<f32>(0.0)) && bsdf.pdf > 0.0;
         let per_density = select(0.0, 1.0 / bsdf.pdf, onwards);
         if (apart) {
             state.onward_diffuse = bsdf.diffuse * per_density;
@@ -135,11 +152,22 @@ fn is_unshadowed(path: u32, slot: u32, state: ptr<function, PathState>) -> bool 
     return (found & ~NEAR_MOVER) == NO_TRIANGLE;
 }
 
+fn end(path: u32, state: PathState) {
+    for (var slot = 0u; slot < 3u; slot++) {
+        send_nothing(path, slot);
+    }
+    paths[path] = state;
+}
+
 // Gathers what the rays of each path found. One thread per path.
 @compute @workgroup_size(64)
 fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let path = id.x + id.y * groups.x * 64u;
     if (path >= wave.path_count) {
+        return;
+    }
+    if (max(max(rays[path].length, rays[wave.path_count + path].length),
+        rays[2u * wave.path_count + path].length) < 0.0) {
         return;
     }
     var state = paths[path];
@@ -163,12 +191,9 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     state.progress |= select(0u, hit.y & NEAR_MOVER, is_sent);
     if (!is_sent || triangle == NO_TRIANGLE) {
         if (HAS_SKY && is_sent) {
-            state.radiance += state.throughput * sky_radiance(ray.direction);
+            state.radiance += state.throughput * sky_by_bsdf(ray.direction, state.pdf);
         }
-        for (var slot = 0u; slot < 3u; slot++) {
-            send_nothing(path, slot);
-        }
-        paths[path] = state;
+        end(path, state);
         return;
     }
     let t = bitcast<f32>(hit.x);
@@ -178,10 +203,15 @@ fn advance(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups
     if (HAS_LIGHTS && state.pdf > 0.0 && any(s.emissive > vec3<f32>(0.0))) {
         let cosine = max(abs(dot(s.ng, wo)), 1e-6);
         let chosen = lamp_density(triangle, ray.origin, state.normal);
-        weight = state.pdf / (state.pdf + chosen * t * t / cosine);
+        let other = chosen * t * t / cosine;
+        weight = select(select(1.0, 0.0, other > 0.0), shared_weight(state.pdf, other), MULTIPLE_IMPORTANCE);
     }
     state.radiance += state.throughput * s.emissive * weight;
     let vertex = state.progress & 0xffffu;
+    if (HAS_NARROW_LOBES && vertex > globals.bounces) {
+        end(path, state);
+        return;
+    }
     state.progress += 1u;
     leave_vertex(path, s, wo, vertex, wave.step + 1u, state);
 }

@@ -10,16 +10,6 @@ struct Sampler {
 // Samples after which a pair of dimensions starts over with another scrambling.
 const SHUFFLE_BITS: u32 = 12u;
 
-fn hash(x_in: u32) -> u32 {
-    var x = x_in;
-    x ^= x >> 16u;
-    x *= 0x21f0aaadu;
-    x ^= x >> 15u;
-    x *= 0xd35a2d97u;
-    x ^= x >> 15u;
-    return x;
-}
-
 fn laine_karras(x_in: u32, seed: u32) -> u32 {
     var x = x_in + seed;
     x ^= x * 0x6c50b47cu;
@@ -41,6 +31,10 @@ fn unit_from_bits(x: u32) -> f32 {
 fn sample_2d(s: ptr<function, Sampler>) -> vec2<f32> {
     let pair = hash((*s).seed ^ ((*s).dimension * 0x9e3779b9u) ^ ((*s).index >> SHUFFLE_BITS) * 0x85ebca6bu);
     (*s).dimension += 1u;
+    if (!LOW_DISCREPANCY) {
+        let x = hash(pair ^ (*s).index * 0xc2b2ae35u);
+        return vec2<f32>(unit_from_bits(x), unit_from_bits(hash(x ^ 0x68bc21ebu)));
+    }
     let index = owen((*s).index, pair) & ((1u << SHUFFLE_BITS) - 1u);
     let x = reverseBits(index);
     var y = 0u;

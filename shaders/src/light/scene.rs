@@ -32,10 +32,10 @@ pub struct Globals {
     pub bounces: u32,
     /// Luminance of a contribution too faint to always be worth a shadow ray.
     pub faint: f32,
-    /// Zero.
-    pub spare: f32,
-    /// Zero.
-    pub padding: [f32; 2],
+    /// Side in pixels of a cell of the picture of all directions.
+    pub environment_cell: u32,
+    /// Of that picture, pixels; zero where the sky is no picture.
+    pub environment_size: [u32; 2],
 }
 
 /// Where a texture's texels are and how they are read.
@@ -72,6 +72,9 @@ impl TextureRecord {
     };
 }
 
+/// In place of a mask's cutoff.
+pub const BLENDED: f32 = 3.0e38;
+
 /// glTF metallic-roughness.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -86,7 +89,8 @@ pub struct Material {
     pub roughness: f32,
     /// Scales x and y of the normal map.
     pub normal_scale: f32,
-    /// Negative where not masked.
+    /// Negative where all of the surface is there, [`BLENDED`] where each ray
+    /// finds as much of it there as alpha says.
     pub alpha_cutoff: f32,
     /// Reflectance of the dielectric at normal incidence.
     pub f0: f32,

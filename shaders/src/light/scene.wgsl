@@ -19,10 +19,18 @@ struct Wave {
 override HAS_SUN: bool = true;
 override HAS_LIGHTS: bool = true;
 override HAS_SKY: bool = true;
+override HAS_ENVIRONMENT: bool = true;
 override HAS_MASKS: bool = true;
 override HAS_TEXTURES: bool = true;
 override HAS_NORMAL_MAPS: bool = true;
 override HAS_MOVERS: bool = true;
+// Lobes too narrow for samples of lamps to fall into, and lamps that rays may meet.
+override HAS_NARROW_LOBES: bool = true;
+
+// What can be switched off to measure what it is worth.
+override LIGHT_SELECTION: bool = true;
+override MULTIPLE_IMPORTANCE: bool = true;
+override LOW_DISCREPANCY: bool = true;
 
 struct Globals {
     sky_zenith: vec3<f32>,
@@ -39,8 +47,10 @@ struct Globals {
     bounces: u32,
     // Luminance of a contribution too faint to always be worth a shadow ray.
     faint: f32,
-    spare: f32,
-    padding: vec2<f32>,
+    // Side in pixels of a cell of the picture of all directions.
+    environment_cell: u32,
+    // Of that picture, pixels; zero where the sky is no picture.
+    environment_size: vec2<u32>,
 }
 
 // Four of the slots of a glTF material: base colour, metallic-roughness, normal, emissive.
@@ -60,7 +70,8 @@ struct Material {
     metallic: f32,
     roughness: f32,
     normal_scale: f32,
-    // Negative where the material is not masked.
+    // Negative where all of the surface is there, BLENDED where each ray finds
+    // as much of it there as alpha says.
     alpha_cutoff: f32,
     // Reflectance of the dielectric at normal incidence.
     f0: f32,
@@ -69,6 +80,8 @@ struct Material {
     padding: vec2<f32>,
     textures: array<TextureRecord, 4>,
 }
+
+const BLENDED: f32 = 3.0e38;
 
 // A triangle's last word: its material, and above it what it moves with.
 const MATERIAL_MASK: u32 = 0xfffffu;
@@ -143,16 +156,18 @@ fn vertex_position(triangle: u32, corner: u32) -> vec3<f32> {
     return vec3<f32>(positions[i], positions[i + 1u], positions[i + 2u]);
 }
 
-fn luminance(c: vec3<f32>) -> f32 {
-    return dot(c, vec3<f32>(0.2126, 0.7152, 0.0722));
+fn hash(x_in: u32) -> u32 {
+    var x = x_in;
+    x ^= x >> 16u;
+    x *= 0x21f0aaadu;
+    x ^= x >> 15u;
+    x *= 0xd35a2d97u;
+    x ^= x >> 15u;
+    return x;
 }
 
-// Radiance of the sky. Twin: SkyModel::radiance.
-fn sky_radiance(d: vec3<f32>) -> vec3<f32> {
-    if (d.y < 0.0) {
-        return mix(globals.sky_horizon, globals.sky_ground, min(-d.y * 8.0, 1.0));
-    }
-    return mix(globals.sky_horizon, globals.sky_zenith, sqrt(d.y));
+fn luminance(c: vec3<f32>) -> f32 {
+    return dot(c, vec3<f32>(0.2126, 0.7152, 0.0722));
 }
 
 // Repeats where the mode is 0, mirrors where it is 1, clamps elsewhere. Divides

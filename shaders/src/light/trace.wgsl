@@ -34,8 +34,8 @@ struct Hit {
 const NEAR_MOVER: u32 = 0x80000000u;
 // The triangle of a hit that is none.
 const NO_TRIANGLE: u32 = 0x7fffffffu;
-// Masked surfaces that a ray may pass through their holes.
-const MOST_HOLES: u32 = 16u;
+// Masked or blended surfaces that a ray may pass.
+const MOST_HOLES: u32 = 64u;
 
 // Deepest traversal: a level of an eight-wide tree per entry.
 const STACK_SIZE: u32 = 24u;
@@ -46,16 +46,21 @@ fn reciprocal(d: vec3<f32>) -> vec3<f32> {
     return select(1.0 / d, signed_huge, tiny);
 }
 
-fn is_there(triangle: u32, b: vec2<f32>) -> bool {
+// How much of a masked or blended surface is there.
+fn opacity(triangle: u32, b: vec2<f32>) -> f32 {
     let record = triangles[triangle];
     let material = record.w & MATERIAL_MASK;
-    var alpha = materials[material].base_color.a;
+    let weights = vec3<f32>(1.0 - b.x - b.y, b.x, b.y);
+    let of_corners = vec3<u32>(bitcast<u32>(corners[record.x * 3u].w), bitcast<u32>(corners[record.y * 3u].w),
+        bitcast<u32>(corners[record.z * 3u].w)) >> vec3<u32>(24u);
+    var alpha = materials[material].base_color.a * dot(vec3<f32>(of_corners), weights) * (1.0 / 255.0);
     if (HAS_TEXTURES && materials[material].textures[0].offset != NONE) {
-        let uv = corners[record.x * 3u + 2u] * (1.0 - b.x - b.y)
-            + corners[record.y * 3u + 2u] * b.x + corners[record.z * 3u + 2u] * b.y;
+        let uv = corners[record.x * 3u + 2u] * weights.x
+            + corners[record.y * 3u + 2u] * weights.y + corners[record.z * 3u + 2u] * weights.z;
         alpha *= texture_at(materials[material].textures[0], uv.xy, uv.zw, 0.0).a;
     }
-    return alpha >= materials[material].alpha_cutoff;
+    let cutoff = materials[material].alpha_cutoff;
+    return select(select(0.0, 1.0, alpha >= cutoff), clamp(alpha, 0.0, 1.0), cutoff == BLENDED);
 }
 
 // Which of four children a ray enters, as bits of their nodes or triangles.
@@ -194,6 +199,14 @@ fn is_masked(triangle: u32) -> bool {
     return materials[triangles[triangle].w & MATERIAL_MASK].alpha_cutoff >= 0.0;
 }
 
+// Drawn anew for each ray and surface, from 0 to 1: rays differ in their bits.
+fn drawn_for(ray: Ray, triangle: u32) -> f32 {
+    let d = bitcast<vec3<u32>>(ray.direction);
+    let o = bitcast<vec3<u32>>(ray.origin);
+    let bits = hash(hash(hash(d.x ^ o.z) ^ d.y ^ o.x) ^ d.z ^ o.y ^ triangle * 0x9e3779b9u);
+    return f32(bits >> 8u) * (1.0 / 16777216.0);
+}
+
 // Traces the queued rays of a wave: one thread per ray.
 // A kernel of its own, because drivers that run threads in lockstep pay for
 // every line of a loop whether or not a lane needs it.
@@ -214,7 +227,7 @@ fn trace_rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     loop {
         hit = trace(ray.origin, ray.direction, start, ray.length, !onwards, onwards && wave.cull != 0u, &near_mover);
         if (!HAS_MASKS || hit.triangle == NONE || holes >= MOST_HOLES
-            || !is_masked(hit.triangle) || is_there(hit.triangle, hit.b)) {
+            || !is_masked(hit.triangle) || opacity(hit.triangle, hit.b) > drawn_for(ray, hit.triangle)) {
             break;
         }
         start = hit.t;

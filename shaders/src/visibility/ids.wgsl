@@ -33,7 +33,7 @@ fn id_fragment(v: IdVertex) -> @location(0) u32 {
 
 @fragment
 fn id_fragment_masked(v: IdVertex) -> @location(0) u32 {
-    if (!is_there(v.triangle, v.b)) {
+    if (opacity(v.triangle, v.b) <= 0.0) {
         discard;
     }
     return v.id;

@@ -1,7 +1,7 @@
 //! Materials as the kernels read them.
 
 use glam::Vec3;
-use shadecast_shaders::light::{Material as MaterialRecord, TextureRecord};
+use shadecast_shaders::light::{BLENDED, Material as MaterialRecord, TextureRecord};
 
 use super::{
     luminance,
@@ -62,7 +62,8 @@ pub(super) fn material_records(scene: &Scene, texels: &Texels) -> Vec<MaterialRe
                 normal_scale: material.normal_scale,
                 alpha_cutoff: match material.alpha {
                     Alpha::Mask { cutoff } => cutoff,
-                    Alpha::Opaque | Alpha::Blend => -1.0,
+                    Alpha::Opaque => -1.0,
+                    Alpha::Blend => BLENDED,
                 },
                 f0: reflectance,
                 double_sided: u32::from(material.double_sided),

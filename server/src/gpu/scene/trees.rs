@@ -82,7 +82,7 @@ impl Trees {
                     let triangle = members[local as usize];
                     let material =
                         &scene.materials[scene.triangles[triangle as usize].material as usize];
-                    let flags = u32::from(matches!(material.alpha, Alpha::Mask { .. }))
+                    let flags = u32::from(material.alpha != Alpha::Opaque)
                         | u32::from(material.double_sided) << 1;
                     let [a, b, c] = corners_of(triangle);
                     [

@@ -109,7 +109,7 @@ impl Reader<'_, '_> {
                 cutoff: material.alpha_cutoff().unwrap_or(0.5),
             },
             AlphaMode::Blend => {
-                self.warn("has alphaMode BLEND, not yet drawn: it is treated as opaque");
+                self.warn("has alphaMode BLEND: rays of light go through it, a headset draws it as if opaque");
                 Alpha::Blend
             }
         }
