@@ -1,13 +1,20 @@
-//! How far a streamed picture is from the picture that it should have been.
+//! How far a streamed picture is from the picture that it should have been, and
+//! what it costs to come near.
 //!
-//! The metrics of the field on pictures of 8-bit sRGB, and beside them the
-//! demo: a server and a client over loopback, path-traced references at the
-//! poses at which the client drew, and a report. Nothing here is needed to run
-//! the product.
+//! The metrics of the field; the demo, which is a server and a client over
+//! loopback with path-traced references at the poses at which the client drew;
+//! and measurements of the light alone. Nothing here is needed to run the product.
 
+pub mod convergence;
 pub mod demo;
 mod metrics;
+mod ours;
+mod progress;
+mod reference;
+mod report;
+mod scenes;
 
 pub use metrics::{
-    FlipMap, MetricError, flip, mean_squared_error, psnr, psnr_from_mean_squared_error, ssim,
+    FlipMap, MetricError, flip, mean_squared_error, psnr, psnr_from_mean_squared_error, relmse,
+    rmse, ssim,
 };

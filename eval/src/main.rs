@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::demo;
+use shadecast_eval::{convergence, demo};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -21,11 +21,20 @@ enum Command {
     /// program, renders path-traced references at the poses at which the client
     /// drew, and writes pictures, summary.json, error.csv and report.md.
     Demo(demo::Options),
+    /// Measures error against run time of a still view.
+    ///
+    /// Path tracing, whole and with one part of the integrator switched off, and the
+    /// atlas as it accumulates, with and without smoothing. Writes convergence.csv,
+    /// .md, .svg and .png, and keeps its references.
+    Convergence(convergence::Options),
 }
 
 fn main() -> ExitCode {
-    let Command::Demo(options) = Arguments::parse().command;
-    match demo::run(&options) {
+    let done = match Arguments::parse().command {
+        Command::Demo(options) => demo::run(&options),
+        Command::Convergence(options) => convergence::run(&options),
+    };
+    match done {
         Ok(table) => {
             print!("{table}");
             ExitCode::SUCCESS

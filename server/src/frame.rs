@@ -157,6 +157,18 @@ impl Pipeline {
         })
     }
 
+    /// The device, and the scene on it.
+    #[must_use]
+    pub fn gpu(&self) -> (&Gpu, &GpuScene) {
+        (&self.gpu, &self.gpu_scene)
+    }
+
+    /// Radiance at the texels of the atlas before tone curve and video: see [`Light::shown`].
+    #[must_use]
+    pub fn shown(&self) -> &wgpu::Buffer {
+        self.light.shown()
+    }
+
     /// The scene and its patches.
     #[must_use]
     pub fn scene(&self) -> &PatchedScene {

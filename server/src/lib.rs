@@ -17,6 +17,14 @@ mod session;
 pub mod still;
 mod visibility;
 
+/// What kernels of other crates need to read the same scene and follow the same paths.
+pub mod kernels {
+    pub use crate::{
+        gpu::{Binding, bind, layout, workgroups},
+        light::{Ends, Paths},
+    };
+}
+
 pub use frame::{Frame, FrameError, FrameOrder, FrameStats, Pipeline, Stages};
 pub use gpu::{Gpu, GpuError, GpuScene, Integrator};
 pub use session::{Input, Output, Session, SessionConfig};

@@ -1,6 +1,6 @@
 //! `summary.json`: everything that a run is judged by, as numbers.
 
-use std::{collections::BTreeMap, fs, thread, time::Duration};
+use std::{collections::BTreeMap, thread, time::Duration};
 
 use anyhow::Result;
 use serde::Serialize;
@@ -10,7 +10,7 @@ use super::{
     errors::SampleError,
     recorded::{ClientRecord, LatencyPhases, PatchShares, Percentiles, ServerRecord},
 };
-use crate::psnr_from_mean_squared_error;
+use crate::{psnr_from_mean_squared_error, report::processor};
 
 /// The figures of a run.
 #[derive(Clone, Debug, Serialize)]
@@ -173,14 +173,6 @@ impl Summary {
 }
 
 /// The processor's name where Linux tells it, else its architecture.
-fn processor() -> String {
-    let info = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
-    info.lines()
-        .filter(|line| line.starts_with("model name"))
-        .find_map(|line| Some(line.split_once(':')?.1.trim().to_owned()))
-        .unwrap_or_else(|| std::env::consts::ARCH.to_owned())
-}
-
 #[cfg(test)]
 pub(super) mod tests {
     use std::path::PathBuf;

@@ -1,12 +1,14 @@
 //! Error between a picture and its reference, both 8-bit sRGB.
 
 mod flip;
+mod linear;
 mod ssim;
 
 use image::RgbImage;
 use thiserror::Error;
 
 pub use flip::{FlipMap, flip};
+pub use linear::{relmse, rmse};
 pub use ssim::ssim;
 
 /// Why two pictures cannot be compared.

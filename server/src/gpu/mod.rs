@@ -243,7 +243,7 @@ impl Gpu {
 
 /// What a binding holds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Binding {
+pub enum Binding {
     /// One host struct.
     Uniform,
     /// A list that kernels read.
@@ -255,7 +255,8 @@ pub(crate) enum Binding {
 }
 
 /// A layout with these bindings, numbered from zero.
-pub(crate) fn layout(
+#[must_use]
+pub fn layout(
     gpu: &Gpu,
     visibility: wgpu::ShaderStages,
     bindings: &[Binding],
@@ -291,7 +292,8 @@ pub(crate) fn layout(
 }
 
 /// A bind group of whole buffers, numbered from zero.
-pub(crate) fn bind(
+#[must_use]
+pub fn bind(
     gpu: &Gpu,
     layout: &wgpu::BindGroupLayout,
     buffers: &[&wgpu::Buffer],
@@ -312,7 +314,8 @@ pub(crate) fn bind(
 
 /// Workgroups for `count` threads in groups of `size`, folded into two
 /// dimensions where one is not long enough.
-pub(crate) fn workgroups(count: u32, size: u32) -> (u32, u32) {
+#[must_use]
+pub fn workgroups(count: u32, size: u32) -> (u32, u32) {
     const LONGEST: u32 = 32_768;
     let groups = count.div_ceil(size).max(1);
     (groups.min(LONGEST), groups.div_ceil(LONGEST))

@@ -32,8 +32,7 @@ const FAINT_SHARE: f32 = 0.01;
 /// halved until they fit.
 const TEXEL_SHARE: f64 = 0.9;
 
-/// How light is found. Whatever is switched off, the light is the same and the
-/// noise is not: that is how `shadecast-eval` tells what each part is worth.
+/// How light is found. Whatever is switched off, the light is the same but for its noise: that is how `shadecast-eval` tells what each part is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integrator {
     /// Indirect bounces; 0 is emission and direct light only.
@@ -44,6 +43,8 @@ pub struct Integrator {
     pub multiple_importance: bool,
     /// Points of Sobol's sequence instead of random numbers.
     pub low_discrepancy: bool,
+    /// Texels that few samples have lit are smoothed.
+    pub smoothing: bool,
     /// What the scene does not use is compiled away.
     pub specialised: bool,
 }
@@ -57,6 +58,7 @@ impl Integrator {
             light_selection: true,
             multiple_importance: true,
             low_discrepancy: true,
+            smoothing: true,
             specialised: true,
         }
     }
@@ -65,10 +67,12 @@ impl Integrator {
 /// The scene's buffers and their one bind group.
 #[derive(Debug)]
 pub struct GpuScene {
-    pub(crate) layout: wgpu::BindGroupLayout,
-    pub(crate) group: wgpu::BindGroup,
+    /// First group of every kernel that reads the scene.
+    pub layout: wgpu::BindGroupLayout,
+    /// The same, bound.
+    pub group: wgpu::BindGroup,
     /// What the kernels leave out, as override constants.
-    pub(crate) constants: Vec<(&'static str, f64)>,
+    pub constants: Vec<(&'static str, f64)>,
     globals: Globals,
     globals_buffer: wgpu::Buffer,
     instances: Vec<Instance>,
@@ -154,6 +158,7 @@ impl GpuScene {
             ("LIGHT_SELECTION", integrator.light_selection),
             ("MULTIPLE_IMPORTANCE", integrator.multiple_importance),
             ("LOW_DISCREPANCY", integrator.low_discrepancy),
+            ("SMOOTHING", integrator.smoothing),
         ];
         let used = used.map(|(name, used)| (name, used || !integrator.specialised));
         let constants = used

@@ -23,7 +23,8 @@ const GROUP: u32 = 64;
 pub struct Paths {
     /// Second group of every kernel that begins, traces or gathers paths.
     pub layout: wgpu::BindGroupLayout,
-    pub(super) group: wgpu::BindGroup,
+    /// The same, bound.
+    pub group: wgpu::BindGroup,
     wave: wgpu::Buffer,
     queued: wgpu::Buffer,
     trace: wgpu::ComputePipeline,

@@ -5,6 +5,7 @@
 //! moving object are in the space of that object. Space is right-handed, +Y
 //! up, metres; colours are linear Rec.709.
 
+mod build;
 mod courtyard;
 mod environment;
 mod export;

@@ -31,6 +31,7 @@ override HAS_NARROW_LOBES: bool = true;
 override LIGHT_SELECTION: bool = true;
 override MULTIPLE_IMPORTANCE: bool = true;
 override LOW_DISCREPANCY: bool = true;
+override SMOOTHING: bool = true;
 
 struct Globals {
     sky_zenith: vec3<f32>,

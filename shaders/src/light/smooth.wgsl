@@ -68,7 +68,7 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         let shiny = glossy[at];
         var diffuse_light = here.rgb;
         var glossy_light = shiny.rgb;
-        if (min(here.w, shiny.w) < ENOUGH_SAMPLES) {
+        if (SMOOTHING && min(here.w, shiny.w) < ENOUGH_SAMPLES) {
             let mean = vec2<f32>(luminance(here.rgb), luminance(shiny.rgb));
             let variance = vec2<f32>(variance_of(mean.x, moments[at].y, here.w),
                 variance_of(mean.y, moments[at].z, shiny.w));

@@ -207,6 +207,22 @@ fn drawn_for(ray: Ray, triangle: u32) -> f32 {
     return f32(bits >> 8u) * (1.0 / 16777216.0);
 }
 
+// Nearest surface that a ray meets, past masked and blended ones that are not
+// there for it.
+fn trace_past_holes(ray: Ray, any: bool, cull: bool, near_mover: ptr<function, bool>) -> Hit {
+    var hit: Hit;
+    var start = ray.start;
+    for (var holes = 0u; holes <= MOST_HOLES; holes++) {
+        hit = trace(ray.origin, ray.direction, start, ray.length, any, cull, near_mover);
+        if (!HAS_MASKS || hit.triangle == NONE || !is_masked(hit.triangle)
+            || opacity(hit.triangle, hit.b) > drawn_for(ray, hit.triangle)) {
+            break;
+        }
+        start = hit.t;
+    }
+    return hit;
+}
+
 // Traces the queued rays of a wave: one thread per ray.
 // A kernel of its own, because drivers that run threads in lockstep pay for
 // every line of a loop whether or not a lane needs it.
@@ -221,18 +237,7 @@ fn trace_rays(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     let slot = index / wave.path_count;
     let onwards = slot == 2u;
     var near_mover = false;
-    var hit: Hit;
-    var start = ray.start;
-    var holes = 0u;
-    loop {
-        hit = trace(ray.origin, ray.direction, start, ray.length, !onwards, onwards && wave.cull != 0u, &near_mover);
-        if (!HAS_MASKS || hit.triangle == NONE || holes >= MOST_HOLES
-            || !is_masked(hit.triangle) || opacity(hit.triangle, hit.b) > drawn_for(ray, hit.triangle)) {
-            break;
-        }
-        start = hit.t;
-        holes += 1u;
-    }
+    let hit = trace_past_holes(ray, !onwards, onwards && wave.cull != 0u, &near_mover);
     let triangle = select(hit.triangle, NO_TRIANGLE, hit.triangle == NONE);
     hits[index] = vec4<u32>(bitcast<u32>(hit.t), triangle | select(0u, NEAR_MOVER, near_mover),
         bitcast<vec2<u32>>(hit.b));
