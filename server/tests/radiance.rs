@@ -2,14 +2,11 @@
 
 use std::{f32::consts::PI, time::Duration};
 
-use glam::{Affine2, DVec3, Quat, Vec2, Vec3, Vec4, vec2, vec3};
-use shadecast_protocol::{Fov, ObjectId, Pose};
+use glam::{Affine2, DVec3, Quat, Vec3, Vec4, vec2, vec3};
+use shadecast_protocol::{Fov, Pose};
 use shadecast_server::{
     Integrator,
-    scene::{
-        Alpha, Corner, EnvironmentMap, Image, Light, Material, Scene, SkyModel, TextureRef,
-        Triangle, Wrap,
-    },
+    scene::{Alpha, EnvironmentMap, Image, Light, Material, Scene, SkyModel, TextureRef, Wrap},
     still::{Camera, DEFAULT_BOUNCES, StillRenderer},
 };
 
@@ -24,31 +21,11 @@ const SIDE: u32 = 16;
 fn squares(materials: Vec<Material>) -> Scene {
     let mut scene = Scene::default();
     for (square, _) in (0..).zip(&materials) {
-        let first = scene.positions.len() as u32;
-        for uv in [
-            vec2(0.0, 0.0),
-            vec2(1.0, 0.0),
-            vec2(1.0, 1.0),
-            vec2(0.0, 1.0),
-        ] {
-            let place = (uv - Vec2::splat(0.5)) * 2.0;
-            let position = middle_of(square) + place.extend(0.0);
-            scene.positions.push(position);
-            scene.corners.push(Corner {
-                normal: Vec3::Z,
-                tangent: Vec4::ZERO,
-                uv: [uv; 2],
-                color: Vec4::ONE,
-            });
-        }
-        for corners in [[0, 1, 2], [0, 2, 3]].map(|corners| corners.map(|c| first + c)) {
-            scene.triangles.push(Triangle {
-                positions: corners,
-                corners,
-                material: square,
-                object: ObjectId::WORLD,
-            });
-        }
+        let corners = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)];
+        scene.add_quad(
+            corners.map(|(x, y)| middle_of(square) + vec3(x, y, 0.0)),
+            square,
+        );
     }
     scene.materials = materials;
     scene
@@ -235,27 +212,9 @@ fn lamps_light_a_plane_as_closed_forms_say() {
         emissive: Vec3::splat(glow),
         ..matte(Vec3::ZERO)
     });
-    let first = scene.positions.len() as u32;
-    for place in [
-        vec2(-1.0, -1.0),
-        vec2(-1.0, 1.0),
-        vec2(1.0, 1.0),
-        vec2(1.0, -1.0),
-    ] {
-        scene.positions.push(place.extend(4.0));
-        scene.corners.push(Corner {
-            normal: Vec3::NEG_Z,
-            ..scene.corners[0]
-        });
-    }
-    for corners in [[0, 1, 2], [0, 2, 3]].map(|corners| corners.map(|c| first + c)) {
-        scene.triangles.push(Triangle {
-            positions: corners,
-            corners,
-            material: 1,
-            object: ObjectId::WORLD,
-        });
-    }
+    let lamp = scene.materials.len() as u32 - 1;
+    let corners = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)];
+    scene.add_quad(corners.map(|(x, y)| vec3(x, y, 4.0)), lamp);
     // Form factor of a quarter of it from below its corner, times four.
     let x = 1.0_f32 / 4.0;
     let root = (1.0 + x * x).sqrt();
@@ -263,6 +222,22 @@ fn lamps_light_a_plane_as_closed_forms_say() {
     let mut renderer = self::renderer(&scene);
     let found = seen(&mut renderer, 0, 0.3);
     assert_near(found, Vec3::splat(albedo * glow * form_factor), 0.005);
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_mirror_shows_a_lamp_without_any_bounce() {
+    let glow = vec3(3.0, 2.0, 1.0);
+    let mut scene = squares(vec![metal(0.0)]);
+    let lamp = scene.add_material(Material {
+        emissive: glow,
+        ..matte(Vec3::ZERO)
+    });
+    let corners = [(-9.0, -9.0), (-9.0, 9.0), (9.0, 9.0), (9.0, -9.0)];
+    scene.add_quad(corners.map(|(x, y)| vec3(x, y, 8.0)), lamp);
+    let integrator = Integrator::with_bounces(0);
+    let mut renderer = StillRenderer::new(&scene, integrator, &mut |_| ()).expect("a GPU");
+    assert_near(seen(&mut renderer, 0, 0.5), glow, 0.005);
 }
 
 #[test]

@@ -79,6 +79,8 @@ pub struct GpuScene {
     instance_buffer: wgpu::Buffer,
     light_tree: LightTree,
     light_nodes: wgpu::Buffer,
+    /// Paths send rays beyond their last vertex, for lamps in narrow lobes.
+    pub(crate) looks_for_lamps: bool,
     /// Bytes on the GPU.
     pub bytes: u64,
     /// Times that images were halved to fit.
@@ -234,6 +236,7 @@ impl GpuScene {
             instance_buffer,
             light_tree,
             light_nodes,
+            looks_for_lamps: facts.lamps_in_narrow_lobes() || !integrator.specialised,
             bytes,
             texture_halvings: texels.halvings,
         })

@@ -120,7 +120,10 @@ impl Paths {
     /// Follows `count` paths from their start to their end, and submits the work.
     pub fn follow(&self, gpu: &Gpu, gpu_scene: &GpuScene, ends: Ends<'_>, count: u32) {
         // A camera's ray comes before the first vertex; each vertex has rays of its own.
-        let steps = gpu_scene.bounces() + 1 + u32::from(ends.from_camera);
+        let steps = gpu_scene.bounces()
+            + 1
+            + u32::from(ends.from_camera)
+            + u32::from(gpu_scene.looks_for_lamps);
         let mut first_job = 0;
         while first_job < count {
             let path_count = (count - first_job).min(self.longest_wave);

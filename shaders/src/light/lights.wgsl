@@ -247,21 +247,22 @@ fn consider(s: Surface, chosen: ptr<function, LightSample>, total: ptr<function,
 
 // Direct light but for the sun's: one candidate of each kind, and one of them by
 // what it would bring. With `with_bsdf_rays` a ray onwards follows.
-fn light_sample(s: Surface, wo: vec3<f32>, with_bsdf_rays: bool, rng: ptr<function, Sampler>) -> LightSample {
+fn light_sample(s: Surface, wo: vec3<f32>, with_bsdf_rays: bool, rng: Sampler) -> LightSample {
     var chosen = NO_LIGHT;
     var total = 0.0;
-    let choice = sample_2d(rng);
+    let choice = sample_pair(rng, PAIR_CHOICE);
     var u = choice.x;
     if (HAS_SKY && !with_bsdf_rays) {
-        let u_sky = sample_2d(rng);
-        consider(s, &chosen, &total, &u, sky_sample(s, wo, u_sky, sample_2d(rng).x));
+        consider(s, &chosen, &total, &u,
+            sky_sample(s, wo, sample_pair(rng, PAIR_SKY), sample_pair(rng, PAIR_SKY_LOBE).x));
     }
     if (has_picture()) {
-        let u_cell = sample_2d(rng);
-        consider(s, &chosen, &total, &u, environment_sample(s, wo, u_cell, sample_2d(rng), true));
+        consider(s, &chosen, &total, &u,
+            environment_sample(s, wo, sample_pair(rng, PAIR_CELL), sample_pair(rng, PAIR_IN_CELL), true));
     }
     if (HAS_LIGHTS) {
-        consider(s, &chosen, &total, &u, lamp_sample(s, wo, choice.y, sample_2d(rng), with_bsdf_rays));
+        consider(s, &chosen, &total, &u,
+            lamp_sample(s, wo, choice.y, sample_pair(rng, PAIR_LAMP), with_bsdf_rays));
     }
     let weight = luminance(both_lobes(s, chosen.bsdf) * chosen.incoming);
     if (weight > 0.0) {

@@ -55,8 +55,20 @@ const SLOT_LIGHT: u32 = 1u;
 const SLOT_ONWARDS: u32 = 2u;
 // Dimension pairs that the start of a path draws.
 const PAIRS_AT_START: u32 = 2u;
-// Dimension pairs that one vertex may draw.
+// Dimension pairs of a vertex, each with a purpose of its own: what a scene leaves
+// out does not change what the rest draws.
 const PAIRS_PER_VERTEX: u32 = 12u;
+const PAIR_SUN: u32 = 0u;
+const PAIR_CHOICE: u32 = 1u;
+const PAIR_LAMP: u32 = 2u;
+const PAIR_SKY: u32 = 3u;
+const PAIR_SKY_LOBE: u32 = 4u;
+const PAIR_CELL: u32 = 5u;
+const PAIR_IN_CELL: u32 = 6u;
+const PAIR_FAINT: u32 = 7u;
+const PAIR_ROULETTE: u32 = 8u;
+const PAIR_ONWARDS: u32 = 9u;
+const PAIR_LOBE: u32 = 10u;
 
 // Below this GGX alpha a lobe is narrow. Twin: SceneFacts.
 const NARROW: f32 = 0.1;
@@ -80,16 +92,21 @@ fn send_nothing(path: u32, slot: u32) {
     rays[slot * wave.path_count + path].length = -1.0;
 }
 
+// The last vertex of a path sends a ray for what shines in a narrow lobe.
+fn looks_for_lamps(s: Surface) -> bool {
+    return HAS_NARROW_LOBES && s.alpha < NARROW && globals.light_count > globals.punctual_count;
+}
+
 // Sends the rays of a vertex: what light it gets, and where the path goes on.
 fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, state_in: PathState) {
     var state = state_in;
-    let sends_onwards = vertex < globals.bounces || (HAS_NARROW_LOBES && s.alpha < NARROW);
+    let sends_onwards = vertex < globals.bounces || looks_for_lamps(s);
     let apart = vertex == 0u && (state.progress & LOBES_APART) != 0u;
-    var rng = Sampler(state.sample_index, state.seed, PAIRS_AT_START + vertex * PAIRS_PER_VERTEX);
+    let rng = Sampler(state.sample_index, state.seed, PAIRS_AT_START + vertex * PAIRS_PER_VERTEX);
     let origin = offset_origin(s);
 
     if (HAS_SUN) {
-        let sun = sun_sample(s, wo, sample_2d(&rng));
+        let sun = sun_sample(s, wo, sample_pair(rng, PAIR_SUN));
         state.sun = state.throughput * both_lobes(s, sun.bsdf) * sun.incoming;
         let shines = select(any(state.sun > vec3<f32>(0.0)), dot(s.ng, sun.direction) > 0.0, apart);
         send(path, SLOT_SUN, origin, sun.direction, select(-1.0, INFINITE, shines), step);
@@ -97,11 +114,11 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
         send_nothing(path, SLOT_SUN);
     }
 
-    let light = light_sample(s, wo, sends_onwards, &rng);
+    let light = light_sample(s, wo, sends_onwards, rng);
     // Russian roulette on what would hardly be seen.
     let worth = luminance(state.throughput * both_lobes(s, light.bsdf) * light.incoming) / globals.faint;
     let survival = clamp(worth, LEAST_SURVIVAL, 1.0);
-    let goes = worth > 0.0 && (survival >= 1.0 || sample_2d(&rng).x < survival);
+    let goes = worth > 0.0 && (survival >= 1.0 || sample_pair(rng, PAIR_FAINT).x < survival);
     let incoming = state.throughput * light.incoming / survival;
     state.light = incoming * select(both_lobes(s, light.bsdf), light.bsdf.specular, apart);
     state.direct_diffuse = select(state.direct_diffuse, incoming * light.bsdf.diffuse, apart);
@@ -112,7 +129,7 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
         // Chance by what the path still carries: white walls go on for ever, grey ones do not.
         let carried = max(max(state.throughput.x, state.throughput.y), state.throughput.z);
         let goes_on = clamp(carried, LEAST_TO_GO_ON, 1.0);
-        if (goes_on < 1.0 && sample_2d(&rng).x >= goes_on) {
+        if (goes_on < 1.0 && sample_pair(rng, PAIR_ROULETTE).x >= goes_on) {
             send_nothing(path, SLOT_ONWARDS);
             paths[path] = state;
             return;
@@ -120,8 +137,7 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
         state.throughput /= goes_on;
     }
     if (sends_onwards) {
-        let u = sample_2d(&rng);
-        let wi = sample_bsdf(s, wo, u, sample_2d(&rng).x);
+        let wi = sample_bsdf(s, wo, sample_pair(rng, PAIR_ONWARDS), sample_pair(rng, PAIR_LOBE).x);
         let bsdf = evaluate_bsdf(s, wo, wi);
         let onwards = any(wi != vec3<f32>(0.0)) && bsdf.pdf > 0.0;
         let per_density = select(0.0, 1.0 / bsdf.pdf, onwards);

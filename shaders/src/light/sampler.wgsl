@@ -48,3 +48,10 @@ fn sample_2d(s: ptr<function, Sampler>) -> vec2<f32> {
         unit_from_bits(reverseBits(laine_karras(reverseBits(y), hash(pair ^ 0x02e5be93u)))),
     );
 }
+
+// The pair of dimensions this far behind the next.
+fn sample_pair(s_in: Sampler, pair: u32) -> vec2<f32> {
+    var s = s_in;
+    s.dimension += pair;
+    return sample_2d(&s);
+}
