@@ -7,6 +7,7 @@
 
 pub mod convergence;
 pub mod demo;
+pub mod leave_out;
 mod metrics;
 mod ours;
 mod progress;

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::{convergence, demo};
+use shadecast_eval::{convergence, demo, leave_out};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -27,12 +27,19 @@ enum Command {
     /// atlas as it accumulates, with and without smoothing. Writes convergence.csv,
     /// .md, .svg and .png, and keeps its references.
     Convergence(convergence::Options),
+    /// Measures what specialisation to a scene is worth.
+    ///
+    /// Draws each scene with kernels from which what it does not use is compiled
+    /// away, and with everything in. Fails where the pictures differ. Writes
+    /// leave-out.csv and .md.
+    LeaveOut(leave_out::Options),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Demo(options) => demo::run(&options),
         Command::Convergence(options) => convergence::run(&options),
+        Command::LeaveOut(options) => leave_out::run(&options),
     };
     match done {
         Ok(table) => {
