@@ -1,5 +1,7 @@
 //! What a block holds is what its patch has there, however it lies.
 
+mod samplers;
+
 use glam::{Affine2, Vec2, Vec3, Vec4, vec2};
 use shadecast_protocol::{Block, Epoch, Level, ObjectId, PatchId, Placement};
 use shadecast_shaders::light::{patch_point, texel_coordinates};

@@ -41,11 +41,13 @@ fn schlick(cosine: f32) -> f32 {
     return m2 * m2 * m;
 }
 
-// GGX density of normals; `cosine` is between normal and half vector.
-fn ggx_d(cosine: f32, alpha: f32) -> f32 {
+// GGX density of half vectors about a normal. The sine is that of the cross product:
+// in a narrow lobe, 1 - cos² would be little but the rounding of the cosine.
+fn ggx_d(n: vec3<f32>, h: vec3<f32>, alpha: f32) -> f32 {
     let a2 = alpha * alpha;
-    // Written around 1 - cos² so that a narrow lobe does not cancel.
-    let d = a2 * cosine * cosine + (1.0 - cosine * cosine);
+    let cosine = dot(n, h);
+    let across = cross(n, h);
+    let d = a2 * cosine * cosine + dot(across, across);
     return a2 / (PI * d * d);
 }
 
@@ -99,9 +101,8 @@ fn evaluate_bsdf(s: Surface, wo: vec3<f32>, wi: vec3<f32>) -> BsdfValue {
         return BsdfValue(0.0, vec3<f32>(0.0), 0.0);
     }
     let h = normalize(wo + wi);
-    let cos_h = clamp(dot(s.ns, h), 0.0, 1.0);
     let fresnel = schlick(dot(wo, h));
-    let d = ggx_d(cos_h, s.alpha);
+    let d = ggx_d(s.ns, h, s.alpha);
     let specular = d * ggx_v(cos_o, cos_i, s.alpha);
     let dielectric_f = s.f0 + (1.0 - s.f0) * fresnel;
     let metal_f = s.base + (1.0 - s.base) * fresnel;

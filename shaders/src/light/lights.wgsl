@@ -14,10 +14,11 @@ struct LightSample {
 const NO_LIGHT = LightSample(vec3<f32>(0.0), 0.0, vec3<f32>(0.0), BsdfValue(0.0, vec3<f32>(0.0), 0.0));
 
 fn sample_cone(axis: vec3<f32>, cos_max: f32, u: vec2<f32>) -> vec3<f32> {
-    let cosine = 1.0 - u.x * (1.0 - cos_max);
-    let sine = sqrt(max(1.0 - cosine * cosine, 0.0));
+    // One less the cosine, of which the sine keeps its digits in a narrow cone.
+    let drop = u.x * (1.0 - cos_max);
+    let sine = sqrt(drop * (2.0 - drop));
     let phi = 2.0 * PI * u.y;
-    return normalize(to_world(frame_around(axis), vec3<f32>(cos(phi) * sine, sin(phi) * sine, cosine)));
+    return normalize(to_world(frame_around(axis), vec3<f32>(cos(phi) * sine, sin(phi) * sine, 1.0 - drop)));
 }
 
 fn sun_sample(s: Surface, wo: vec3<f32>, u: vec2<f32>) -> LightSample {
