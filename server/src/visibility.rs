@@ -3,14 +3,15 @@
 //! Each viewpoint is drawn as a picture of patch ids over an enlarged field of
 //! view; a compute pass counts the pixels of each patch. The union over both
 //! eyes of the current and the extrapolated heads is the potentially visible
-//! set. The atlas keeps a patch for a while after it was last in the set, which
-//! also covers what is too small to meet a pixel's centre in every picture.
+//! set. What is too small to meet a pixel's centre in every picture is met sooner
+//! or later, since each picture's pixels lie elsewhere, and the atlas keeps a patch
+//! for a while after it was last in the set.
 //!
 //! Source: SAS 2018, section 3.1 and figure 5.
 
 use std::time::Duration;
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Vec2, Vec3, vec2};
 use shadecast_protocol::{Fov, PatchId, Pose, ViewReport};
 use shadecast_shaders::visibility::{IDS_SOURCE, MARK_SOURCE};
 use wgpu::ShaderStages;
@@ -102,6 +103,8 @@ pub struct Visibility {
     readback: wgpu::Buffer,
     target: Option<Target>,
     patches: usize,
+    /// Pictures drawn so far.
+    pictures: u32,
 }
 
 #[derive(Debug)]
@@ -207,6 +210,7 @@ impl Visibility {
             readback: gpu.readback("pixels of patch", bytes),
             target: None,
             patches: scene.patches.len(),
+            pictures: 0,
         })
     }
 
@@ -230,16 +234,17 @@ impl Visibility {
             return Ok(Vec::new());
         };
 
-        let views: Vec<Mat4> = prediction
-            .world_from_heads
-            .iter()
-            .flat_map(|head| {
-                prediction
-                    .view
-                    .eyes
-                    .map(|eye| clip_from_world(head.then(eye.head_from_eye), eye.fov))
+        let pixels = vec2(target.size.0 as f32, target.size.1 as f32);
+        let views: Vec<Mat4> = (prediction.world_from_heads.iter())
+            .flat_map(|head| prediction.view.eyes.map(|eye| (*head, eye)))
+            .zip(self.pictures..)
+            .map(|((head, eye), picture)| {
+                let offset = offset_of(picture) * 2.0 / pixels;
+                Mat4::from_translation(offset.extend(0.0))
+                    * clip_from_world(head.then(eye.head_from_eye), eye.fov)
             })
             .collect();
+        self.pictures = self.pictures.wrapping_add(views.len() as u32);
         let objects = poses.len() + 1;
         let matrices: Vec<Mat4> = views
             .iter()
@@ -370,6 +375,16 @@ impl Visibility {
             mark_group,
         });
     }
+}
+
+/// By how much of a pixel a picture's pixels lie aside: evenly over a pixel, and
+/// any few in a row are far apart. Source: Roberts, "The Unreasonable Effectiveness
+/// of Quasirandom Sequences", 2018 (R2).
+fn offset_of(picture: u32) -> Vec2 {
+    // Fractions of 2^32, so that wrapping is exact however many pictures there were.
+    const STEPS: [u32; 2] = [0xc13f_a9a9, 0x91e1_0da5];
+    let [x, y] = STEPS.map(|step| (picture.wrapping_mul(step) >> 8) as f32 / (1 << 24) as f32);
+    vec2(x, y) - 0.5
 }
 
 fn clip_from_world(world_from_eye: Pose, fov: Fov) -> Mat4 {
