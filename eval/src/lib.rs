@@ -14,6 +14,7 @@ mod progress;
 mod reference;
 mod report;
 mod scenes;
+pub mod sequence;
 pub mod svgf;
 
 pub use metrics::{

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::{convergence, demo, leave_out};
+use shadecast_eval::{convergence, demo, leave_out, sequence};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -33,6 +33,11 @@ enum Command {
     /// away, and with everything in. Fails where the pictures differ. Writes
     /// leave-out.csv and .md.
     LeaveOut(leave_out::Options),
+    /// Measures the error of what is displayed while a head or a lamp moves.
+    ///
+    /// Fresh frames, screen-space filtering (SVGF) and ours get the same time for
+    /// each update. Writes sequence.csv, .md, .svg and .png, and keeps its references.
+    Sequence(sequence::Options),
 }
 
 fn main() -> ExitCode {
@@ -40,6 +45,7 @@ fn main() -> ExitCode {
         Command::Demo(options) => demo::run(&options),
         Command::Convergence(options) => convergence::run(&options),
         Command::LeaveOut(options) => leave_out::run(&options),
+        Command::Sequence(options) => sequence::run(&options),
     };
     match done {
         Ok(table) => {

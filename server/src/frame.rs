@@ -13,7 +13,7 @@ use crate::{
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
-    light::{Job, Lasting, Light, Schedule},
+    light::{Job, Lasting, Light, Schedule, Viewer},
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
     scene::{Material, Scene},
@@ -244,9 +244,14 @@ impl Pipeline {
                     .job(&self.scene.patches, placed.patch, placed.block, &eyes)
             })
             .collect();
+        let viewer = Viewer {
+            eye,
+            pixels_per_radian,
+            exposure: self.exposure,
+        };
         let noise = self
             .light
-            .trace(&self.gpu, &self.gpu_scene, &jobs, &moved, eye)?;
+            .trace(&self.gpu, &self.gpu_scene, &jobs, &moved, viewer)?;
         self.schedule.traced(&jobs, &noise);
         stages.light = lap();
 

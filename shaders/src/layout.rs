@@ -157,7 +157,8 @@ fn layouts_match() {
         block_count,
         atlas_width,
         seed,
-        padding
+        pixel_angle,
+        exposure
     );
     same_layout!(
         &atlas,

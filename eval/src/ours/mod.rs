@@ -15,7 +15,7 @@ use shadecast_server::{
     encode::{EncodeError, EncodedPicture, Planes, VideoEncoder},
     patches::{self, PatchLimits},
     scene::Scene,
-    still::Still,
+    still::{Still, StillPass},
 };
 
 use self::view::AtlasView;
@@ -47,8 +47,13 @@ impl Ours {
         let patched = patches::cut(scene.clone(), PatchLimits::for_atlas(superblock, density));
         let gpu_scene = GpuScene::new(&gpu, &patched.scene, integrator, &mut |_| ())?;
         let encoder = Box::new(NoVideo);
+        let exposure = StillPass::new(&gpu, &gpu_scene)?.automatic_exposure(
+            &gpu,
+            &gpu_scene,
+            patched.scene.first_eye(),
+        )?;
         let pipeline = Pipeline::new(
-            gpu, gpu_scene, patched, [atlas; 2], superblock, encoder, 1.0,
+            gpu, gpu_scene, patched, [atlas; 2], superblock, encoder, exposure,
         )
         .context("cannot make frames of the scene")?;
         Ok(Self {

@@ -33,6 +33,17 @@ pub use schedule::{Job, Lasting, Schedule};
 /// Most blocks that are lit or moved by one update.
 const MOST_BLOCKS: u64 = 1 << 18;
 
+/// Who looks at the light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewer {
+    /// Metres, in the world.
+    pub eye: Vec3,
+    /// In the middle of its picture.
+    pub pixels_per_radian: f32,
+    /// Factor from radiance to displayed brightness.
+    pub exposure: f32,
+}
+
 /// The accumulated radiance and the kernels that make it.
 #[derive(Debug)]
 pub struct Light {
@@ -247,7 +258,7 @@ impl Light {
         gpu_scene: &GpuScene,
         jobs: &[Job],
         moved: &[Job],
-        eye: Vec3,
+        viewer: Viewer,
     ) -> Result<Vec<f32>, GpuError> {
         let most = (self.blocks.size() / size_of::<BlockRecord>() as u64) as usize;
         let mut records = Vec::with_capacity(most.min(jobs.len() + moved.len()));
@@ -270,10 +281,12 @@ impl Light {
             return Ok(Vec::new());
         }
         let parameters = LightParameters {
-            eye: eye.to_array(),
+            eye: viewer.eye.to_array(),
             block_count: records.len() as u32,
             atlas_width: self.atlas_width,
-            ..Default::default()
+            seed: 0,
+            pixel_angle: 1.0 / viewer.pixels_per_radian,
+            exposure: viewer.exposure,
         };
         gpu.queue
             .write_buffer(&self.parameters, 0, bytemuck::bytes_of(&parameters));

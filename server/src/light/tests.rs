@@ -16,6 +16,11 @@ use crate::{
 
 const ATLAS: u16 = 64;
 const EYE: Vec3 = Vec3::new(0.5, 0.5, 2.0);
+const VIEWER: Viewer = Viewer {
+    eye: EYE,
+    pixels_per_radian: 100.0,
+    exposure: 1.0,
+};
 
 /// A square that glows in four colours, one a quarter.
 fn four_quarters() -> PatchedScene {
@@ -135,7 +140,7 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
         let job = [schedule.job(&scene.patches, PatchId(0), block, &[EYE])];
         let jobs = if old.is_none() { &job[..] } else { &[] };
         light
-            .trace(&gpu, &gpu_scene, jobs, &job, EYE)
+            .trace(&gpu, &gpu_scene, jobs, &job, VIEWER)
             .expect("light");
         let mut encoder = (gpu.device).create_command_encoder(&Default::default());
         encoder.copy_buffer_to_buffer(light.shown(), 0, &readback, 0, bytes);

@@ -15,8 +15,10 @@ pub struct LightParameters {
     pub atlas_width: u32,
     /// Of the sampler.
     pub seed: u32,
-    /// Zero.
-    pub padding: [u32; 2],
+    /// Width that a pixel's sample has a metre away.
+    pub pixel_angle: f32,
+    /// Factor from radiance to displayed brightness.
+    pub exposure: f32,
 }
 
 /// A block whose texels are lit.

@@ -16,7 +16,10 @@ struct LightParameters {
     block_count: u32,
     atlas_width: u32,
     seed: u32,
-    padding: vec2<u32>,
+    // Width of a pixel a metre away.
+    pixel_angle: f32,
+    // Factor from radiance to displayed brightness.
+    exposure: f32,
 }
 
 struct BlockRecord {

@@ -1,7 +1,9 @@
 // What the surroundings of a texel have found, whichever patch they belong to:
-// a hash of cells in the world, by place, size and direction. A cell is about
-// ten pixels wide wherever it is, so that it has no scale of its own. Light is
-// added at a jittered place, so that cells blend into each other.
+// a hash of cells in the world, by place, size and direction. A cell is a few
+// pixels wide wherever it is, so that it has no scale of its own. Light is added
+// at a jittered place, so that cells blend into each other. What a texel takes
+// from them is a mean over cells in the plane about it: walls behind, and walls
+// at an angle, have cells of their own.
 // Sums are integers: adding them commutes, and the order of threads cannot show.
 // Source: Binder et al., "Massively Parallel Path Space Filtering", 2019.
 
@@ -21,32 +23,42 @@ struct Cell {
 const LOG2_CELL_COUNT: u32 = 17u;
 const CELL_COUNT: u32 = 1u << LOG2_CELL_COUNT;
 const MOST_FINGERPRINT: u32 = (1u << (32u - LOG2_CELL_COUNT)) - 1u;
-// Width of a cell per metre of distance.
-const CELL_ANGLE: f32 = 0.08;
-// Fixed point of the sums, and the brightest that one path may add.
+// Most pixels that a cell is wide, and half as many at least.
+const CELL_PIXELS: f32 = 8.0;
+// Cells on either side that a texel's surroundings reach to.
+const CELL_REACH: i32 = 2;
+// Fixed point of the sums, in displayed brightness, and the brightest that one
+// path may add.
 const CELL_UNIT: f32 = 1024.0;
 const BRIGHTEST: f32 = 64.0;
 // Each update forgets this share of what the cells hold.
-const FORGETTING: u32 = 24u;
+const FORGETTING: u32 = 10u;
+
+fn cell_width(position: vec3<f32>) -> f32 {
+    let distance = max(length(position - parameters.eye), 1e-6);
+    return exp2(floor(log2(distance * parameters.pixel_angle * CELL_PIXELS)));
+}
 
 // The cell's index, and its fingerprint above it.
-fn cell_around(position: vec3<f32>, n: vec3<f32>, jitter: vec2<f32>) -> u32 {
-    let distance = max(length(position - parameters.eye), 1e-6);
-    let level = floor(log2(distance * CELL_ANGLE));
-    let width = exp2(level);
-    let f = frame_around(n);
-    let place = vec3<i32>(floor((position + (f.x * jitter.x + f.y * jitter.y) * width) / width));
+fn cell_at(position: vec3<f32>, n: vec3<f32>, width: f32) -> u32 {
     let m = abs(n);
     var side = select(select(2u, 1u, m.y >= m.z), 0u, m.x >= m.y && m.x >= m.z);
     side = side * 2u + select(0u, 1u, n[side] < 0.0);
-    let key = bitcast<vec3<u32>>(place);
-    return hash(key.x ^ hash(key.y ^ hash(key.z ^ hash(side ^ (bitcast<u32>(i32(level)) << 3u)))));
+    let key = bitcast<vec3<u32>>(vec3<i32>(floor(position / width)));
+    return hash(key.x ^ hash(key.y ^ hash(key.z ^ hash(side ^ (bitcast<u32>(width) >> 20u)))));
+}
+
+// The cell that a path's light is added to, `jitter` from -0.5 to 0.5.
+fn cell_around(position: vec3<f32>, n: vec3<f32>, jitter: vec2<f32>) -> u32 {
+    let width = cell_width(position);
+    let f = frame_around(n);
+    return cell_at(position + (f.x * jitter.x + f.y * jitter.y) * width, n, width);
 }
 
 fn add_to_cell(key: u32, light: vec3<f32>) {
     let cell = key % CELL_COUNT;
     let fingerprint = key >> LOG2_CELL_COUNT;
-    let fixed = vec3<u32>(min(light, vec3<f32>(BRIGHTEST)) * CELL_UNIT);
+    let fixed = vec3<u32>(min(light * parameters.exposure, vec3<f32>(BRIGHTEST)) * CELL_UNIT);
     atomicAdd(&cells[cell].sum[0], fixed.x);
     atomicAdd(&cells[cell].sum[1], fixed.y);
     atomicAdd(&cells[cell].sum[2], fixed.z);
@@ -55,7 +67,7 @@ fn add_to_cell(key: u32, light: vec3<f32>) {
     atomicMax(&cells[cell].greatest_complement, MOST_FINGERPRINT - fingerprint);
 }
 
-// Mean light of a cell, and how many paths it comes from: none where it is shared.
+// Sum of a cell's light, and how many paths it comes from: none where it is shared.
 fn cell_light(key: u32) -> vec4<f32> {
     let cell = key % CELL_COUNT;
     let fingerprint = key >> LOG2_CELL_COUNT;
@@ -64,7 +76,22 @@ fn cell_light(key: u32) -> vec4<f32> {
     let count = select(0.0, f32(atomicLoad(&cells[cell].count)) / 16.0, is_own);
     let sum = vec3<f32>(vec3<u32>(atomicLoad(&cells[cell].sum[0]), atomicLoad(&cells[cell].sum[1]),
         atomicLoad(&cells[cell].sum[2])));
-    return vec4<f32>(sum / (CELL_UNIT * max(count, 1.0)), count);
+    return vec4<f32>(sum / (CELL_UNIT * parameters.exposure), 1.0) * vec4<f32>(1.0, 1.0, 1.0, count);
+}
+
+// Mean light of the surroundings of a point, and how many paths it comes from.
+fn light_around(position: vec3<f32>, n: vec3<f32>) -> vec4<f32> {
+    let width = cell_width(position);
+    let f = frame_around(n);
+    var sum = vec4<f32>(0.0);
+    for (var y = -CELL_REACH; y <= CELL_REACH; y++) {
+        for (var x = -CELL_REACH; x <= CELL_REACH; x++) {
+            let aside = vec2<f32>(vec2<i32>(x, y));
+            let key = cell_at(position + (f.x * aside.x + f.y * aside.y) * width, n, width);
+            sum += cell_light(key) * exp(-0.5 * dot(aside, aside));
+        }
+    }
+    return vec4<f32>(sum.rgb / max(sum.w, 1e-6), sum.w);
 }
 
 @compute @workgroup_size(64)

@@ -121,7 +121,8 @@ fn leave_vertex(path: u32, s: Surface, wo: vec3<f32>, vertex: u32, step: u32, st
     let goes = worth > 0.0 && (survival >= 1.0 || sample_pair(rng, PAIR_FAINT).x < survival);
     let incoming = state.throughput * light.incoming / survival;
     state.light = incoming * select(both_lobes(s, light.bsdf), light.bsdf.specular, apart);
-    state.direct_diffuse = select(state.direct_diffuse, incoming * light.bsdf.diffuse, apart);
+    state.direct_diffuse = select(state.direct_diffuse,
+        select(vec3<f32>(0.0), incoming * light.bsdf.diffuse, goes), apart);
     // Short of the lamp by a few rounding steps.
     send(path, SLOT_LIGHT, origin, light.direction, select(-1.0, light.distance * 0.9999, goes), step);
 

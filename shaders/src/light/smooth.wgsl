@@ -3,9 +3,9 @@
 //
 // Diffuse and glossy light are each the mean over a small window of the block,
 // each neighbour counting by its samples and by how likely the difference is
-// noise; diffuse light besides the mean of the surroundings in the world, where
-// even the window holds few samples. All fades out as samples come in, so that a
-// still scene converges to what was traced. Colour, normal, emission and the sun's
+// noise; diffuse light besides over the surroundings in the world, which reach
+// across the borders of patches. All fades out as the texel's own error falls, so
+// that a still scene converges to what was traced. Colour, normal, emission and the sun's
 // reflection are those of the texel's middle: they are free of noise.
 // One workgroup per block; reads the scene and what texels remember, writes `shown`.
 // Source: Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017,
@@ -15,20 +15,32 @@
 
 // Texels on either side that are looked at.
 const RADIUS: i32 = 3;
-// Samples after which a texel stands for itself.
-const ENOUGH_SAMPLES: f32 = 48.0;
+// Relative error that smoothing is believed to make: a texel whose own is far
+// below it stands for itself.
+const SMOOTHING_ERROR: f32 = 0.08;
 // Standard deviations of difference that still count as noise.
 const TOLERANCE: f32 = 3.0;
 // Relative standard deviation assumed of one sample, while too few tell.
 const ASSUMED_NOISE: f32 = 0.8;
-// Samples that the surroundings count for.
-const CELL_WEIGHT: f32 = 6.0;
+// Relative standard deviation that a sample has at least.
+const LEAST_NOISE: f32 = 0.8;
+// Samples of a texel by which the surroundings count half as much: they know less
+// and less that it does not know itself, and are wider than its window.
+const SURROUNDED_SAMPLES: f32 = 4.5;
 
 // Variance of a mean of `samples` samples with this mean square.
 fn variance_of(mean: f32, mean_square: f32, samples: f32) -> f32 {
     let measured = max(mean_square - mean * mean, 0.0);
     let assumed = ASSUMED_NOISE * ASSUMED_NOISE * mean * mean;
     return mix(assumed, measured, clamp((samples - 1.0) / 8.0, 0.0, 1.0)) / max(samples, 0.02);
+}
+
+// How much a texel stands for itself beside what it is smoothed to. Samples that
+// all found nothing do not make it certain that there is nothing to find.
+fn own_share(variance: f32, samples: f32, smoothed: f32) -> f32 {
+    let believed = SMOOTHING_ERROR * SMOOTHING_ERROR * smoothed * smoothed;
+    let least = LEAST_NOISE * LEAST_NOISE * smoothed * smoothed / max(samples, 0.02);
+    return believed / max(believed + max(variance, least), 1e-20);
 }
 
 // How much a neighbour counts whose mean differs by `difference`.
@@ -68,13 +80,14 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         let shiny = glossy[at];
         var diffuse_light = here.rgb;
         var glossy_light = shiny.rgb;
-        if (SMOOTHING && min(here.w, shiny.w) < ENOUGH_SAMPLES) {
+        if (SMOOTHING) {
             let mean = vec2<f32>(luminance(here.rgb), luminance(shiny.rgb));
             let variance = vec2<f32>(variance_of(mean.x, moments[at].y, here.w),
                 variance_of(mean.y, moments[at].z, shiny.w));
             var sum = vec3<f32>(0.0);
             var sum_glossy = vec3<f32>(0.0);
             var weights = vec2<f32>(0.0);
+            let around = light_around(s.position, s.ng);
             let low = max(p - RADIUS, vec2<i32>(0));
             let high = min(p + RADIUS, size - 1);
             for (var y = low.y; y <= high.y; y++) {
@@ -83,22 +96,22 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                     let other = diffuse[near];
                     let other_glossy = glossy[near];
                     let other_mean = vec2<f32>(luminance(other.rgb), luminance(other_glossy.rgb));
+                    let other_variance = vec2<f32>(variance_of(other_mean.x, moments[near].y, other.w),
+                        variance_of(other_mean.y, moments[near].z, other_glossy.w));
                     let weight = vec2<f32>(
-                        other.w * likeness(other_mean.x - mean.x,
-                            variance.x + variance_of(other_mean.x, moments[near].y, other.w)),
-                        other_glossy.w * likeness(other_mean.y - mean.y,
-                            variance.y + variance_of(other_mean.y, moments[near].z, other_glossy.w)));
+                        other.w * likeness(other_mean.x - mean.x, variance.x + other_variance.x),
+                        other_glossy.w * likeness(other_mean.y - mean.y, variance.y + other_variance.y));
                     sum += other.rgb * weight.x;
                     sum_glossy += other_glossy.rgb * weight.y;
                     weights += weight;
                 }
             }
-            let around = cell_light(cell_around(s.position, s.ng, vec2<f32>(0.0)));
-            let trust = CELL_WEIGHT * clamp(around.w / 16.0, 0.0, 1.0);
+            let known = here.w / SURROUNDED_SAMPLES;
+            let trust = around.w / (1.0 + known * known);
             let smoothed = (sum + around.rgb * trust) / max(weights.x + trust, 1e-6);
             let smoothed_glossy = sum_glossy / max(weights.y, 1e-6);
-            diffuse_light = mix(smoothed, here.rgb, min(here.w / ENOUGH_SAMPLES, 1.0));
-            glossy_light = mix(smoothed_glossy, shiny.rgb, min(shiny.w / ENOUGH_SAMPLES, 1.0));
+            diffuse_light = mix(smoothed, here.rgb, own_share(variance.x, here.w, luminance(smoothed)));
+            glossy_light = mix(smoothed_glossy, shiny.rgb, own_share(variance.y, shiny.w, luminance(smoothed_glossy)));
         }
         var light = s.emissive + diffuse_color(s) * diffuse_light + glossy_light;
         if (HAS_SUN) {
