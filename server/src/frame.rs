@@ -135,7 +135,7 @@ impl Pipeline {
     ) -> Result<Self, FrameError> {
         let atlas = Atlas::new(size, superblock)?;
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
-        let light = Light::new(&gpu, &gpu_scene, size)?;
+        let light = Light::new(&gpu, &gpu_scene, size, exposure)?;
         let picture = PictureConversion::new(&gpu, light.shown(), size)?;
         let lasting = scene
             .patches

@@ -157,6 +157,7 @@ fn layouts_match() {
         block_count,
         atlas_width,
         seed,
+        exposure,
         padding
     );
     same_layout!(

@@ -37,6 +37,7 @@ const MOST_BLOCKS: u64 = 1 << 18;
 #[derive(Debug)]
 pub struct Light {
     atlas_width: u32,
+    exposure: f32,
     texels: Texels,
     /// As they were before blocks moved; made when a block first moves.
     texels_before: Option<Texels>,
@@ -81,11 +82,16 @@ impl Texels {
 }
 
 impl Light {
-    /// An atlas of `size` texels, all unlit.
+    /// An atlas of `size` texels, all unlit, that is displayed at `exposure`.
     ///
     /// # Errors
     /// When the atlas is larger than the device binds.
-    pub fn new(gpu: &Gpu, gpu_scene: &GpuScene, size: [u16; 2]) -> Result<Self, GpuError> {
+    pub fn new(
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        size: [u16; 2],
+        exposure: f32,
+    ) -> Result<Self, GpuError> {
         let texel_count = u64::from(size[0]) * u64::from(size[1]);
         let most_blocks = MOST_BLOCKS.min(texel_count / 4).max(1);
         let own_layout = layout(
@@ -142,6 +148,7 @@ impl Light {
         );
         Ok(Self {
             atlas_width: u32::from(size[0]),
+            exposure,
             start: pipeline("start_at_texels"),
             accumulate: pipeline("accumulate"),
             measure: pipeline("measure_noise"),
@@ -273,6 +280,7 @@ impl Light {
             eye: eye.to_array(),
             block_count: records.len() as u32,
             atlas_width: self.atlas_width,
+            exposure: self.exposure,
             ..Default::default()
         };
         gpu.queue

@@ -106,7 +106,7 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
     let gpu = Gpu::open().expect("a GPU");
     let gpu_scene = GpuScene::new(&gpu, &scene.scene, Integrator::with_bounces(1), &mut |_| ())
         .expect("a scene");
-    let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2]).expect("an atlas");
+    let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2], 1.0).expect("an atlas");
     let schedule = Schedule::new(vec![Lasting {
         longest_history: 64.0,
         point: Vec3::ZERO,

@@ -15,8 +15,10 @@ pub struct LightParameters {
     pub atlas_width: u32,
     /// Of the sampler.
     pub seed: u32,
+    /// Factor before the tone curve: what is bright and what is dark.
+    pub exposure: f32,
     /// Zero.
-    pub padding: [u32; 2],
+    pub padding: u32,
 }
 
 /// A block whose texels are lit.

@@ -23,7 +23,8 @@ const CELL_COUNT: u32 = 1u << LOG2_CELL_COUNT;
 const MOST_FINGERPRINT: u32 = (1u << (32u - LOG2_CELL_COUNT)) - 1u;
 // Width of a cell per metre of distance.
 const CELL_ANGLE: f32 = 0.08;
-// Fixed point of the sums, and the brightest that one path may add.
+// Fixed point of the sums, and the brightest that one path may add, both of what
+// is displayed.
 const CELL_UNIT: f32 = 1024.0;
 const BRIGHTEST: f32 = 64.0;
 // Each update forgets this share of what the cells hold.
@@ -46,7 +47,7 @@ fn cell_around(position: vec3<f32>, n: vec3<f32>, jitter: vec2<f32>) -> u32 {
 fn add_to_cell(key: u32, light: vec3<f32>) {
     let cell = key % CELL_COUNT;
     let fingerprint = key >> LOG2_CELL_COUNT;
-    let fixed = vec3<u32>(min(light, vec3<f32>(BRIGHTEST)) * CELL_UNIT);
+    let fixed = vec3<u32>(min(light * parameters.exposure, vec3<f32>(BRIGHTEST)) * CELL_UNIT);
     atomicAdd(&cells[cell].sum[0], fixed.x);
     atomicAdd(&cells[cell].sum[1], fixed.y);
     atomicAdd(&cells[cell].sum[2], fixed.z);
@@ -64,7 +65,7 @@ fn cell_light(key: u32) -> vec4<f32> {
     let count = select(0.0, f32(atomicLoad(&cells[cell].count)) / 16.0, is_own);
     let sum = vec3<f32>(vec3<u32>(atomicLoad(&cells[cell].sum[0]), atomicLoad(&cells[cell].sum[1]),
         atomicLoad(&cells[cell].sum[2])));
-    return vec4<f32>(sum / (CELL_UNIT * max(count, 1.0)), count);
+    return vec4<f32>(sum / (CELL_UNIT * parameters.exposure * max(count, 1.0)), count);
 }
 
 @compute @workgroup_size(64)
