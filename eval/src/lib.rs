@@ -13,6 +13,7 @@ mod progress;
 mod reference;
 mod report;
 mod scenes;
+pub mod stress;
 
 pub use metrics::{
     FlipMap, MetricError, flip, mean_squared_error, psnr, psnr_from_mean_squared_error, relmse,

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::{convergence, demo};
+use shadecast_eval::{convergence, demo, stress};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -27,12 +27,17 @@ enum Command {
     /// atlas as it accumulates, with and without smoothing. Writes convergence.csv,
     /// .md, .svg and .png, and keeps its references.
     Convergence(convergence::Options),
+    /// Measures what must hold in extreme and stiff cases.
+    ///
+    /// Writes stress.csv and .md, and fails where something does not hold.
+    Stress(stress::Options),
 }
 
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Demo(options) => demo::run(&options),
         Command::Convergence(options) => convergence::run(&options),
+        Command::Stress(options) => stress::run(&options),
     };
     match done {
         Ok(table) => {
