@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::{convergence, demo, leave_out, sequence};
+use shadecast_eval::{convergence, demo, leave_out, sequence, stress};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -38,6 +38,10 @@ enum Command {
     /// Fresh frames, screen-space filtering (SVGF) and ours get the same time for
     /// each update. Writes sequence.csv, .md, .svg and .png, and keeps its references.
     Sequence(sequence::Options),
+    /// Measures what must hold in extreme and stiff cases.
+    ///
+    /// Writes stress.csv and .md, and fails where something does not hold.
+    Stress(stress::Options),
 }
 
 fn main() -> ExitCode {
@@ -46,6 +50,7 @@ fn main() -> ExitCode {
         Command::Convergence(options) => convergence::run(&options),
         Command::LeaveOut(options) => leave_out::run(&options),
         Command::Sequence(options) => sequence::run(&options),
+        Command::Stress(options) => stress::run(&options),
     };
     match done {
         Ok(table) => {

@@ -240,27 +240,6 @@ fn a_mirror_shows_a_lamp_without_any_bounce() {
     assert_near(seen(&mut renderer, 0, 0.5), glow, 0.005);
 }
 
-#[test]
-#[ignore = "needs a Vulkan driver"]
-fn thousands_of_lamps_add_up() {
-    let albedo = 0.5;
-    let mut scene = squares(vec![matte(Vec3::splat(albedo))]);
-    let mut irradiance = 0.0;
-    for lamp in 0..2000_u32 {
-        // A golden spiral of unequal lamps, a few of them below the plane.
-        let turn = 2.399_963 * lamp as f32;
-        let distance = 0.25 * (lamp as f32).sqrt();
-        let height = (lamp % 17) as f32 * 0.5 - 0.5 + 0.11;
-        let position = vec3(distance * turn.cos(), distance * turn.sin(), height);
-        let intensity = 0.001 * (1 + lamp % 5) as f32 * (height * height);
-        irradiance += irradiance_at(Vec3::ZERO, position, intensity);
-        scene.lights.push(point_lamp(position, intensity));
-    }
-    let mut renderer = renderer(&scene);
-    let expected = albedo * irradiance / PI;
-    assert_near(seen(&mut renderer, 0, 0.3), Vec3::splat(expected), 0.02);
-}
-
 /// A sky with a small bright sun in it, as a picture.
 fn picture_of_a_sky() -> EnvironmentMap {
     let (width, height) = (64, 32);

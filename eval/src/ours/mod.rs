@@ -3,7 +3,10 @@
 
 mod view;
 
-use std::time::Duration;
+use std::{
+    sync::{Arc, Mutex, PoisonError},
+    time::Duration,
+};
 
 use anyhow::{Context, Result};
 use glam::Vec3;
@@ -31,6 +34,7 @@ pub(crate) struct Ours {
     fov: Fov,
     side: u16,
     next: FrameId,
+    planes: LastPlanes,
 }
 
 impl Ours {
@@ -38,20 +42,42 @@ impl Ours {
     pub(crate) fn new(
         scene: &Scene,
         integrator: Integrator,
+        view: (Fov, u16),
+        atlas: u16,
+    ) -> Result<Self> {
+        Self::build(scene, integrator, view, atlas, None)
+    }
+
+    /// The same at this exposure instead of a measured one.
+    pub(crate) fn exposed(
+        scene: &Scene,
+        integrator: Integrator,
+        view: (Fov, u16),
+        atlas: u16,
+        exposure: f32,
+    ) -> Result<Self> {
+        Self::build(scene, integrator, view, atlas, Some(exposure))
+    }
+
+    fn build(
+        scene: &Scene,
+        integrator: Integrator,
         (fov, side): (Fov, u16),
         atlas: u16,
+        exposure: Option<f32>,
     ) -> Result<Self> {
         let gpu = Gpu::open()?;
         let superblock = atlas / SUPERBLOCKS_A_SIDE;
         let density = f32::from(side) / (fov.right - fov.left);
         let patched = patches::cut(scene.clone(), PatchLimits::for_atlas(superblock, density));
         let gpu_scene = GpuScene::new(&gpu, &patched.scene, integrator, &mut |_| ())?;
-        let encoder = Box::new(NoVideo);
-        let exposure = StillPass::new(&gpu, &gpu_scene)?.automatic_exposure(
-            &gpu,
-            &gpu_scene,
-            patched.scene.first_eye(),
-        )?;
+        let eye = patched.scene.first_eye();
+        let exposure = match exposure {
+            Some(exposure) => exposure,
+            None => StillPass::new(&gpu, &gpu_scene)?.automatic_exposure(&gpu, &gpu_scene, eye)?,
+        };
+        let planes = LastPlanes::default();
+        let encoder = Box::new(NoVideo(Arc::clone(&planes)));
         let pipeline = Pipeline::new(
             gpu, gpu_scene, patched, [atlas; 2], superblock, encoder, exposure,
         )
@@ -62,6 +88,7 @@ impl Ours {
             fov,
             side,
             next: FrameId(0),
+            planes,
         })
     }
 
@@ -108,6 +135,13 @@ impl Ours {
     pub(crate) fn see(&self, view: (Pose, [f32; 4]), size: [u32; 2]) -> Result<Still> {
         self.view.see(&self.pipeline, view, size)
     }
+
+    /// What the video of the last frame is made of; none before the first.
+    pub(crate) fn planes(&self) -> Option<Planes> {
+        // A frame that panicked leaves no planes behind.
+        let planes = self.planes.lock().unwrap_or_else(PoisonError::into_inner);
+        planes.clone()
+    }
 }
 
 fn wall_clock() -> impl Fn() -> Duration {
@@ -115,11 +149,15 @@ fn wall_clock() -> impl Fn() -> Duration {
     move || began.elapsed()
 }
 
+type LastPlanes = Arc<Mutex<Option<Planes>>>;
+
 /// The light is looked at before it becomes video.
-struct NoVideo;
+struct NoVideo(LastPlanes);
 
 impl VideoEncoder for NoVideo {
-    fn encode(&mut self, _: &Planes, idr: bool) -> Result<EncodedPicture, EncodeError> {
+    fn encode(&mut self, planes: &Planes, idr: bool) -> Result<EncodedPicture, EncodeError> {
+        let mut last = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        *last = Some(planes.clone());
         Ok(EncodedPicture {
             bytes: Vec::new(),
             idr,

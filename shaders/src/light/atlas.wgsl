@@ -46,6 +46,10 @@ struct BlockRecord {
 // Samples over which means run where a moving object was met.
 const MOVING_HISTORY: f32 = 6.0;
 
+// Light of a path at most: its square fits single precision, and is white however
+// it is exposed.
+const BRIGHTEST_PATH: f32 = 1e18;
+
 const TURNED: u32 = 1u << 14u;
 
 struct PatchPoint {
@@ -191,8 +195,9 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     // A coarse look is one sample, shared by the texels that it lights.
     let weight_of_sample = 1.0 / f32(job.stride * job.stride);
     let indirect = sound(state.radiance);
-    let found_diffuse = sound(state.direct_diffuse + state.onward_diffuse * indirect);
-    let found_glossy = sound(state.direct_glossy + state.onward_glossy * indirect);
+    let brightest = vec3<f32>(BRIGHTEST_PATH);
+    let found_diffuse = min(sound(state.direct_diffuse + state.onward_diffuse * indirect), brightest);
+    let found_glossy = min(sound(state.direct_glossy + state.onward_glossy * indirect), brightest);
     add_to_cell(state.cell, found_diffuse);
     var longest = job.block.longest_history;
     if ((state.progress & NEAR_MOVER) != 0u) {

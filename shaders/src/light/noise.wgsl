@@ -27,7 +27,7 @@ fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
             // What is shown of the diffuse light tells the colour that it falls on.
             let seen = luminance(shown[at].rgb);
             let color = min(seen / max(mean.x + mean.y, 1e-6), 1.0);
-            sum += (error.x * color + error.y) / (seen + 0.2);
+            sum += parameters.exposure * (error.x * color + error.y) / (parameters.exposure * seen + 0.2);
             count += 1.0;
         }
     }

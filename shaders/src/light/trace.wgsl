@@ -141,10 +141,12 @@ fn trace(origin: vec3<f32>, direction: vec3<f32>, start: f32, t_max: f32, any: b
             let far_y = select(ny.zw, ny.xy, d.y < 0.0);
             let near_z = select(nz.xy, nz.zw, d.z < 0.0);
             let far_z = select(nz.zw, nz.xy, d.z < 0.0);
+            // A shadow ray stops short of its lamp, which may be what moves.
+            let reach = select(hit.t, hit.t * 1.0003, HAS_MOVERS && instance != 0u);
             let hits = child_hits(n1.z, octant, near_x.x, near_y.x, near_z.x, far_x.x, far_y.x, far_z.x,
-                    scale, entry, start, hit.t)
+                    scale, entry, start, reach)
                 | child_hits(n1.w, octant, near_x.y, near_y.y, near_z.y, far_x.y, far_y.y, far_z.y,
-                    scale, entry, start, hit.t);
+                    scale, entry, start, reach);
             if (HAS_MOVERS && instance != 0u && hits != 0u) {
                 *near_mover = true;
             }

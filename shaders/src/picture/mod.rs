@@ -18,11 +18,15 @@ pub struct PictureParameters {
     pub padding: u32,
 }
 
+/// Radiance times exposure that is as white as any: infinity would be no number
+/// on the curve.
+const BRIGHTEST: f32 = 1e30;
+
 /// Twin of `tone_map`: Khronos PBR Neutral, which leaves colours below 0.8 as
 /// they are. Linear in, linear in [0, 1) out.
 #[must_use]
 pub fn tone_map(radiance: Vec3) -> Vec3 {
-    let c = radiance.max(Vec3::ZERO);
+    let c = radiance.max(Vec3::ZERO).min(Vec3::splat(BRIGHTEST));
     let start = 0.8 - 0.04;
     let x = c.min_element();
     let offset = if x < 0.08 { x - 6.25 * x * x } else { 0.04 };
@@ -86,6 +90,7 @@ mod tests {
         assert_eq!(displayed(Vec3::splat(f32::NAN), 1.0), [0; 3]);
         assert_eq!(displayed(Vec3::splat(-1.0), 1.0), [0; 3]);
         assert_eq!(displayed(Vec3::splat(1e30), 1.0), [255; 3]);
+        assert_eq!(displayed(Vec3::splat(3e38), 1e6), [255; 3]);
     }
 
     #[test]

@@ -17,8 +17,12 @@ struct PictureParameters {
 // What is seen where nothing was ever lit: mid grey costs the fewest bits.
 const EMPTY: f32 = 0.5;
 
+// Radiance times exposure that is as white as any: infinity would be no number
+// on the curve.
+const BRIGHTEST: f32 = 1e30;
+
 fn tone_map(radiance_in: vec3<f32>) -> vec3<f32> {
-    var c = max(radiance_in, vec3<f32>(0.0));
+    var c = clamp(radiance_in, vec3<f32>(0.0), vec3<f32>(BRIGHTEST));
     let start = 0.8 - 0.04;
     let x = min(c.r, min(c.g, c.b));
     let offset = select(0.04, x - 6.25 * x * x, x < 0.08);

@@ -99,7 +99,18 @@ impl Reader<'_, '_> {
         if !finite {
             return Err(LoadError::invalid(&*self.place, "a factor is not finite"));
         }
-        Ok(result)
+        if result.emissive.min_element() < 0.0 || result.ior < 0.0 {
+            let fault = "its emission or its index of refraction is negative";
+            return Err(LoadError::invalid(&*self.place, fault));
+        }
+        let base_color = result.base_color.clamp(Vec4::ZERO, Vec4::ONE);
+        if base_color != result.base_color {
+            self.warn("has a base colour beyond 0 to 1, which would make light: it is kept within");
+        }
+        Ok(Material {
+            base_color,
+            ..result
+        })
     }
 
     fn alpha(&mut self, material: &gltf::Material<'_>) -> Alpha {

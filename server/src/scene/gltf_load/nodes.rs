@@ -45,7 +45,7 @@ pub(super) fn flatten<'a>(
             return Err(LoadError::Cycle { node: index });
         }
         let world_from_node = world_from_parent * walk.locals[index];
-        if !world_from_node.is_finite() {
+        if !world_from_node.as_mat4().is_finite() {
             let place = format!("nodes[{index}]");
             return Err(LoadError::invalid(place, "its transform is not finite"));
         }

@@ -126,6 +126,36 @@ fn numbers_must_be_finite() {
         json["nodes"][0]["translation"] = json!([1e38, 1e39, 0])
     }));
     assert!(!error.is_empty());
+    // Finite alone, but not one after the other.
+    let error = sentence(with(|json, _| {
+        json["nodes"] =
+            json!([{ "scale": [1e30, 1, 1], "children": [1] }, { "translation": [1e30, 0, 0] }]);
+    }));
+    assert_eq!(error, "nodes[1]: its transform is not finite");
+}
+
+#[test]
+fn materials_must_not_make_light_nor_take_it() {
+    let with_material = |material: Value| {
+        with(move |json, _| {
+            json["materials"] = json!([material]);
+            json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        })
+    };
+    for wrong in [
+        json!({ "emissiveFactor": [0, -1, 0] }),
+        json!({ "extensions": { "KHR_materials_ior": { "ior": -1 } } }),
+    ] {
+        let error = sentence(with_material(wrong));
+        assert!(error.starts_with("materials[0]: its emission"), "{error}");
+    }
+    let white = json!({ "pbrMetallicRoughness": { "baseColorFactor": [10, 0.5, -1, 1] } });
+    let scene = with_material(white).unwrap();
+    assert_eq!(
+        scene.materials[0].base_color.to_array(),
+        [1.0, 0.5, 0.0, 1.0]
+    );
+    assert!(scene.notes.warnings[0].starts_with("materials[0] has a base colour beyond"));
 }
 
 #[test]
