@@ -25,6 +25,10 @@ const CELL_COUNT: u32 = 1u << LOG2_CELL_COUNT;
 const MOST_FINGERPRINT: u32 = (1u << (32u - LOG2_CELL_COUNT)) - 1u;
 // Most pixels that a cell is wide, and half as many at least.
 const CELL_PIXELS: f32 = 8.0;
+// Relative standard deviation assumed of one sample, while too few tell.
+const ASSUMED_NOISE: f32 = 0.8;
+// Standard deviations of difference that still count as noise.
+const CELL_TOLERANCE: f32 = 2.5;
 // Cells on either side that a texel's surroundings reach to.
 const CELL_REACH: i32 = 2;
 // Fixed point of the sums, in displayed brightness, and the brightest that one
@@ -80,7 +84,9 @@ fn cell_light(key: u32) -> vec4<f32> {
 }
 
 // Mean light of the surroundings of a point, and how many paths it comes from.
-fn light_around(position: vec3<f32>, n: vec3<f32>) -> vec4<f32> {
+// Cells count by how likely their difference from `mean`, which comes from
+// `samples`, is noise: shadows and highlights keep their shape.
+fn light_around(position: vec3<f32>, n: vec3<f32>, mean: f32, samples: f32) -> vec4<f32> {
     let width = cell_width(position);
     let f = frame_around(n);
     var sum = vec4<f32>(0.0);
@@ -88,7 +94,12 @@ fn light_around(position: vec3<f32>, n: vec3<f32>) -> vec4<f32> {
         for (var x = -CELL_REACH; x <= CELL_REACH; x++) {
             let aside = vec2<f32>(vec2<i32>(x, y));
             let key = cell_at(position + (f.x * aside.x + f.y * aside.y) * width, n, width);
-            sum += cell_light(key) * exp(-0.5 * dot(aside, aside));
+            let found = cell_light(key);
+            let difference = luminance(found.rgb) / max(found.w, 1.0) - mean;
+            let noise = ASSUMED_NOISE * max(mean, mean + difference);
+            let variance = noise * noise * (1.0 / max(samples, 0.02) + 1.0 / max(found.w, 1.0));
+            let likely = exp(-difference * difference / max(CELL_TOLERANCE * CELL_TOLERANCE * variance, 1e-20));
+            sum += found * exp(-0.5 * dot(aside, aside)) * likely;
         }
     }
     return vec4<f32>(sum.rgb / max(sum.w, 1e-6), sum.w);

@@ -20,8 +20,6 @@ const RADIUS: i32 = 3;
 const SMOOTHING_ERROR: f32 = 0.08;
 // Standard deviations of difference that still count as noise.
 const TOLERANCE: f32 = 3.0;
-// Relative standard deviation assumed of one sample, while too few tell.
-const ASSUMED_NOISE: f32 = 0.8;
 // Relative standard deviation that a sample has at least.
 const LEAST_NOISE: f32 = 0.8;
 // Samples of a texel by which the surroundings count half as much: they know less
@@ -87,7 +85,6 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             var sum = vec3<f32>(0.0);
             var sum_glossy = vec3<f32>(0.0);
             var weights = vec2<f32>(0.0);
-            let around = light_around(s.position, s.ng);
             let low = max(p - RADIUS, vec2<i32>(0));
             let high = min(p + RADIUS, size - 1);
             for (var y = low.y; y <= high.y; y++) {
@@ -106,6 +103,8 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
                     weights += weight;
                 }
             }
+            let window = luminance(sum) / max(weights.x, 1e-6);
+            let around = light_around(s.position, s.ng, window, weights.x);
             let known = here.w / SURROUNDED_SAMPLES;
             let trust = around.w / (1.0 + known * known);
             let smoothed = (sum + around.rgb * trust) / max(weights.x + trust, 1e-6);
