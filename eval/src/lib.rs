@@ -15,6 +15,7 @@ mod reference;
 mod report;
 mod scenes;
 pub mod sequence;
+pub mod speed;
 pub mod stress;
 pub mod svgf;
 

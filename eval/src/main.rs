@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::{convergence, demo, leave_out, sequence, stress};
+use shadecast_eval::{convergence, demo, leave_out, sequence, speed, stress};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -38,6 +38,11 @@ enum Command {
     /// Fresh frames, screen-space filtering (SVGF) and ours get the same time for
     /// each update. Writes sequence.csv, .md, .svg and .png, and keeps its references.
     Sequence(sequence::Options),
+    /// Measures where the time of the light goes.
+    ///
+    /// Traversal, shading and smoothing at one path a texel, told apart by running
+    /// them more than once. Writes speed.csv and .md.
+    Speed(speed::Options),
     /// Measures what must hold in extreme and stiff cases.
     ///
     /// Writes stress.csv and .md, and fails where something does not hold.
@@ -50,6 +55,7 @@ fn main() -> ExitCode {
         Command::Convergence(options) => convergence::run(&options),
         Command::LeaveOut(options) => leave_out::run(&options),
         Command::Sequence(options) => sequence::run(&options),
+        Command::Speed(options) => speed::run(&options),
         Command::Stress(options) => stress::run(&options),
     };
     match done {

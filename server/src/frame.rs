@@ -13,7 +13,7 @@ use crate::{
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
-    light::{Job, Lasting, Light, Schedule, Viewer},
+    light::{Job, Lasting, Light, Repeats, Schedule, Viewer},
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
     scene::{Material, Scene},
@@ -167,6 +167,19 @@ impl Pipeline {
     #[must_use]
     pub fn shown(&self) -> &wgpu::Buffer {
         self.light.shown()
+    }
+
+    /// Rays traced so far; see [`Light::rays`].
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn rays(&self) -> Result<u64, GpuError> {
+        self.light.rays(&self.gpu)
+    }
+
+    /// How often stages of the light run from now on.
+    pub fn set_repeats(&mut self, repeats: Repeats) {
+        self.light.set_repeats(repeats);
     }
 
     /// The scene and its patches.

@@ -21,7 +21,7 @@ mod visibility;
 pub mod kernels {
     pub use crate::{
         gpu::{Binding, bind, layout, workgroups},
-        light::{Ends, Paths},
+        light::{Ends, Paths, Repeats},
     };
 }
 

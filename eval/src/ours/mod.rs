@@ -131,6 +131,11 @@ impl Ours {
         Ok((frame.stats, spent))
     }
 
+    /// The pipeline behind the frames.
+    pub(crate) fn pipeline(&mut self) -> &mut Pipeline {
+        &mut self.pipeline
+    }
+
     /// What a camera sees of the atlas as it is now.
     pub(crate) fn see(&self, view: (Pose, [f32; 4]), size: [u32; 2]) -> Result<Still> {
         self.view.see(&self.pipeline, view, size)

@@ -44,6 +44,16 @@ pub struct Viewer {
     pub exposure: f32,
 }
 
+/// How often stages run that leave the same when they run again: more than once
+/// only to tell what they cost.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Repeats {
+    /// Traversal of rays.
+    pub traversal: u32,
+    /// Smoothing of blocks.
+    pub smoothing: u32,
+}
+
 /// The accumulated radiance and the kernels that make it.
 #[derive(Debug)]
 pub struct Light {
@@ -67,6 +77,8 @@ pub struct Light {
     carry_layout: wgpu::BindGroupLayout,
     carry_parameters: wgpu::Buffer,
     moves: wgpu::Buffer,
+    /// See [`Repeats`].
+    smoothings: u32,
 }
 
 /// What texels remember: see `atlas.wgsl`.
@@ -168,10 +180,25 @@ impl Light {
             shown,
             parameters,
             blocks,
+            smoothings: 1,
             noise_readback: gpu.readback("noise", most_blocks * 4),
             noise,
             group,
         })
+    }
+
+    /// Rays traced so far.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn rays(&self, gpu: &Gpu) -> Result<u64, GpuError> {
+        self.paths.rays(gpu)
+    }
+
+    /// How often stages run from now on.
+    pub fn set_repeats(&mut self, repeats: Repeats) {
+        self.paths.repeats = repeats.traversal;
+        self.smoothings = repeats.smoothing;
     }
 
     /// The radiance to show and the samples behind it, four floats a texel, row by row.
@@ -312,7 +339,9 @@ impl Light {
             pass.dispatch_workgroups(CELL_COUNT / 64, 1, 1);
             pass.set_pipeline(&self.smooth);
             let (x, y) = workgroups(records.len() as u32, 1);
-            pass.dispatch_workgroups(x, y, 1);
+            for _ in 0..self.smoothings {
+                pass.dispatch_workgroups(x, y, 1);
+            }
             pass.set_pipeline(&self.measure);
             pass.dispatch_workgroups((records.len() as u32).div_ceil(64), 1, 1);
         }

@@ -31,6 +31,9 @@ pub struct Paths {
     advance: wgpu::ComputePipeline,
     count: wgpu::ComputePipeline,
     longest_wave: u32,
+    /// Times that rays are traced, with the same result: more than once only to
+    /// tell what it costs.
+    pub repeats: u32,
 }
 
 /// What begins paths and what gathers them, with their third group.
@@ -93,6 +96,7 @@ impl Paths {
             advance,
             count,
             longest_wave,
+            repeats: 1,
         })
     }
 
@@ -160,7 +164,9 @@ impl Paths {
                     if step == 0 {
                         dispatch(ends.start, path_count);
                     }
-                    dispatch(&self.trace, path_count * 3);
+                    for _ in 0..self.repeats {
+                        dispatch(&self.trace, path_count * 3);
+                    }
                     dispatch(&self.advance, path_count);
                     if step + 1 == steps {
                         dispatch(ends.finish, path_count);
