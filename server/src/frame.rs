@@ -163,13 +163,13 @@ impl Pipeline {
         (&self.gpu, &self.gpu_scene)
     }
 
-    /// Radiance at the texels of the atlas before tone curve and video: see [`Light::shown`].
+    /// Radiance at the texels of the atlas before tone curve and video.
     #[must_use]
     pub fn shown(&self) -> &wgpu::Buffer {
         self.light.shown()
     }
 
-    /// Rays traced so far; see [`Light::rays`].
+    /// Rays traced so far.
     ///
     /// # Errors
     /// When the driver fails.
