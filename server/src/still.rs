@@ -165,6 +165,7 @@ impl StillPass {
                 .write_buffer(&film.parameters, 0, bytemuck::bytes_of(&values));
             let ends = Ends {
                 start: &self.start,
+                before_finish: None,
                 finish: &self.add,
                 group: &film.group,
                 from_camera: true,

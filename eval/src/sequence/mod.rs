@@ -32,7 +32,7 @@ use crate::{
     progress::Progress,
     reference::{self, Reference, Subject},
     relmse,
-    report::{Folder, Header, Spent},
+    report::{Folder, Header},
     scenes,
 };
 
@@ -42,7 +42,7 @@ const PIXELS_PER_RADIAN: f32 = 170.0;
 const BUDGETS: [f64; 3] = [2.0, 4.0, 8.0];
 const QUICK_BUDGETS: [f64; 1] = [4.0];
 /// Updates that the speed is measured over.
-const TRIALS: u32 = 5;
+const TRIALS: u32 = 9;
 /// Longest that a reference may take, however many samples it lacks.
 const LONGEST_REFERENCE: Duration = Duration::from_secs(3600);
 
@@ -275,11 +275,13 @@ fn speed_of(method: &Method, scene: &Scene, camera: &Camera) -> Result<Speed> {
     // Drivers compile at the first use.
     contender.update(camera, Duration::ZERO, much)?;
     let mut trial = |work| -> Result<f64> {
-        let mut spent = Spent::default();
+        let mut seconds = Vec::new();
         for update in 0..TRIALS {
-            spent += contender.update(camera, time_of(update), work)?;
+            let spent = contender.update(camera, time_of(update), work)?;
+            seconds.push(spent.wall.as_secs_f64());
         }
-        Ok(spent.wall.as_secs_f64() / f64::from(TRIALS))
+        seconds.sort_by(f64::total_cmp);
+        Ok(seconds[seconds.len() / 2])
     };
     let (of_little, of_much) = (trial(little)?, trial(much)?);
     let per_work = ((of_much - of_little) / f64::from(much - little)).max(1e-9);

@@ -112,6 +112,7 @@ impl Svgf {
         });
         let ends = Ends {
             start: &self.light.start,
+            before_finish: None,
             finish: &self.light.gather,
             group: &self.light.group,
             from_camera: false,

@@ -8,7 +8,7 @@ use wgpu::util::DeviceExt;
 pub use scene::{GpuScene, Integrator};
 
 /// Storage buffers that the light kernels bind at once.
-const STORAGE_BUFFERS: u32 = 25;
+const STORAGE_BUFFERS: u32 = 26;
 
 /// Why there is no usable GPU.
 #[derive(Debug, Error)]

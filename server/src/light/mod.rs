@@ -68,6 +68,7 @@ pub struct Light {
     noise_readback: wgpu::Buffer,
     paths: Paths,
     start: wgpu::ComputePipeline,
+    change: wgpu::ComputePipeline,
     accumulate: wgpu::ComputePipeline,
     measure: wgpu::ComputePipeline,
     smooth: wgpu::ComputePipeline,
@@ -123,6 +124,7 @@ impl Light {
                 Binding::Write,
                 Binding::Write,
                 Binding::Write,
+                Binding::Write,
             ],
         );
         let texels = Texels::new(gpu, texel_count)?;
@@ -131,6 +133,7 @@ impl Light {
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
         let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
         let noise = gpu.scratch("noise", most_blocks * 4)?;
+        let kept = gpu.scratch("kept histories", most_blocks * 8)?;
         let group = bind(
             gpu,
             &own_layout,
@@ -143,6 +146,7 @@ impl Light {
                 &shown,
                 &texels.moments,
                 &cells,
+                &kept,
             ],
         );
         let paths = Paths::new(gpu, gpu_scene, texel_count as u32)?;
@@ -166,6 +170,7 @@ impl Light {
         Ok(Self {
             atlas_width: u32::from(size[0]),
             start: pipeline("start_at_texels"),
+            change: pipeline("measure_change"),
             accumulate: pipeline("accumulate"),
             measure: pipeline("measure_noise"),
             smooth: pipeline("smooth_blocks"),
@@ -321,6 +326,7 @@ impl Light {
             .write_buffer(&self.blocks, 0, bytemuck::cast_slice(&records));
         let ends = Ends {
             start: &self.start,
+            before_finish: Some((&self.change, records.len() as u32)),
             finish: &self.accumulate,
             group: &self.group,
             from_camera: false,

@@ -41,6 +41,8 @@ pub struct Paths {
 pub struct Ends<'a> {
     /// Makes the first vertex or ray of each path.
     pub start: &'a wgpu::ComputePipeline,
+    /// Looks at what paths bring before it is taken, and in how many workgroups.
+    pub before_finish: Option<(&'a wgpu::ComputePipeline, u32)>,
     /// Takes what each path brings.
     pub finish: &'a wgpu::ComputePipeline,
     /// What both bind.
@@ -169,6 +171,9 @@ impl Paths {
                     }
                     dispatch(&self.advance, path_count);
                     if step + 1 == steps {
+                        if let Some((pipeline, groups)) = ends.before_finish {
+                            dispatch(pipeline, groups * GROUP);
+                        }
                         dispatch(ends.finish, path_count);
                         dispatch(&self.count, 1);
                     }

@@ -44,7 +44,7 @@ struct BlockRecord {
 @group(2) @binding(6) var<storage, read_write> moments: array<vec4<f32>>;
 
 // Samples over which means run where a moving object was met.
-const MOVING_HISTORY: f32 = 6.0;
+const MOVING_HISTORY: f32 = 16.0;
 
 // Light of a path at most: its square fits single precision, and is white however
 // it is exposed.
@@ -96,6 +96,8 @@ fn patch_point(shape: u32, p_in: vec2<f32>) -> PatchPoint {
 
 struct Job {
     block: BlockRecord,
+    // Of the block.
+    index: u32,
     // First of the texels that the path lights, in the block.
     corner: vec2<u32>,
     size: vec2<u32>,
@@ -114,8 +116,13 @@ fn job_at(index: u32) -> Job {
             high = middle - 1u;
         }
     }
+    return job_of(low, index);
+}
+
+fn job_of(block: u32, index: u32) -> Job {
     var job: Job;
-    job.block = blocks[low];
+    job.block = blocks[block];
+    job.index = block;
     let log_stride = (job.block.layout_bits >> 10u) & 15u;
     job.size = vec2<u32>(1u << (job.block.layout_bits & 15u), 1u << ((job.block.layout_bits >> 4u) & 15u));
     job.stride = 1u << log_stride;
@@ -184,6 +191,22 @@ fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
     leave_vertex(path, seen.surface, seen.wo, 0u, 0u, state);
 }
 
+// What a path has brought its texels.
+struct Found {
+    diffuse: vec3<f32>,
+    glossy: vec3<f32>,
+    // Share of the sun that was seen.
+    sun: f32,
+}
+
+fn found_by(state: PathState) -> Found {
+    let indirect = sound(state.radiance);
+    let brightest = vec3<f32>(BRIGHTEST_PATH);
+    return Found(min(sound(state.direct_diffuse + state.onward_diffuse * indirect), brightest),
+        min(sound(state.direct_glossy + state.onward_glossy * indirect), brightest),
+        select(0.0, 1.0, (state.progress & SUNLIT) != 0u));
+}
+
 @compute @workgroup_size(64)
 fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let path = id.x + id.y * groups.x * 64u;
@@ -194,30 +217,27 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     let state = paths[path];
     // A coarse look is one sample, shared by the texels that it lights.
     let weight_of_sample = 1.0 / f32(job.stride * job.stride);
-    let indirect = sound(state.radiance);
-    let brightest = vec3<f32>(BRIGHTEST_PATH);
-    let found_diffuse = min(sound(state.direct_diffuse + state.onward_diffuse * indirect), brightest);
-    let found_glossy = min(sound(state.direct_glossy + state.onward_glossy * indirect), brightest);
-    add_to_cell(state.cell, found_diffuse);
+    let found = found_by(state);
+    add_to_cell(state.cell, found.diffuse);
+    let keep = kept[job.index];
     var longest = job.block.longest_history;
     if ((state.progress & NEAR_MOVER) != 0u) {
         longest = min(longest, MOVING_HISTORY);
     }
-    let of_diffuse = luminance(found_diffuse);
-    let of_glossy = luminance(found_glossy);
-    let found = vec4<f32>(select(0.0, 1.0, (state.progress & SUNLIT) != 0u),
-        of_diffuse * of_diffuse, of_glossy * of_glossy, 0.0);
+    let of_diffuse = luminance(found.diffuse);
+    let of_glossy = luminance(found.glossy);
+    let found_moments = vec4<f32>(found.sun, of_diffuse * of_diffuse, of_glossy * of_glossy, 0.0);
     for (var y = 0u; y < min(job.stride, job.size.y - job.corner.y); y++) {
         for (var x = 0u; x < min(job.stride, job.size.x - job.corner.x); x++) {
             let at = ((job.block.position >> 16u) + job.corner.y + y) * parameters.atlas_width
                 + (job.block.position & 0xffffu) + job.corner.x + x;
-            let history = min(diffuse[at].w, longest);
+            let history = min(diffuse[at].w, longest) * keep.x;
             let share = weight_of_sample / (history + weight_of_sample);
-            diffuse[at] = vec4<f32>(mix(diffuse[at].rgb, found_diffuse, share), history + weight_of_sample);
-            let glossy_history = min(glossy[at].w * job.block.glossy_keep, longest);
+            diffuse[at] = vec4<f32>(mix(diffuse[at].rgb, found.diffuse, share), history + weight_of_sample);
+            let glossy_history = min(glossy[at].w * job.block.glossy_keep, longest) * keep.y;
             let glossy_share = weight_of_sample / (glossy_history + weight_of_sample);
-            glossy[at] = vec4<f32>(mix(glossy[at].rgb, found_glossy, glossy_share), glossy_history + weight_of_sample);
-            moments[at] = mix(moments[at], found, vec4<f32>(share, share, glossy_share, 0.0));
+            glossy[at] = vec4<f32>(mix(glossy[at].rgb, found.glossy, glossy_share), glossy_history + weight_of_sample);
+            moments[at] = mix(moments[at], found_moments, vec4<f32>(share, share, glossy_share, 0.0));
         }
     }
 }

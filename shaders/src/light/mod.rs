@@ -39,10 +39,15 @@ macro_rules! path_source {
 pub const TRACE_SOURCE: &str = concat!(include_str!("scene.wgsl"), include_str!("trace.wgsl"));
 /// Kernel `advance`.
 pub const ADVANCE_SOURCE: &str = path_source!();
-/// Kernels `start_at_texels`, `accumulate`, `measure_noise`, `smooth_blocks` and
+/// Kernels `start_at_texels`, `measure_change`, `accumulate`, `measure_noise`, `smooth_blocks` and
 /// `fade_cells`.
-pub const ATLAS_SOURCE: &str =
-    path_source!("cells.wgsl", "atlas.wgsl", "noise.wgsl", "smooth.wgsl");
+pub const ATLAS_SOURCE: &str = path_source!(
+    "cells.wgsl",
+    "atlas.wgsl",
+    "change.wgsl",
+    "noise.wgsl",
+    "smooth.wgsl"
+);
 /// Kernels `start_at_pixels` and `add_to_pixels`.
 pub const STILL_SOURCE: &str = path_source!("still.wgsl");
 /// Cells of the hash in which light is shared with its surroundings.
