@@ -37,7 +37,7 @@ pub struct Options {
     #[arg(value_name = "SCENE", default_values_t = ["courtyard", "lamps", "plates"].map(String::from))]
     pub scenes: Vec<String>,
     /// Folder for figures.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = crate::OUT)]
     pub out: PathBuf,
     /// Fewer runs of smaller pictures.
     #[arg(long)]

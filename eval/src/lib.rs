@@ -19,6 +19,9 @@ pub mod speed;
 pub mod stress;
 pub mod svgf;
 
+/// Where figures go unless told otherwise; their files have the commands' names.
+pub(crate) const OUT: &str = "eval-out";
+
 pub use metrics::{
     FlipMap, MetricError, flip, mean_squared_error, psnr, psnr_from_mean_squared_error, relmse,
     rmse, ssim,

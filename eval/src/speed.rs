@@ -36,7 +36,7 @@ pub struct Options {
     #[arg(value_name = "SCENE", default_values_t = ["courtyard", "lamps", "plates"].map(String::from))]
     pub scenes: Vec<String>,
     /// Folder for figures.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = crate::OUT)]
     pub out: PathBuf,
     /// Smaller pictures and fewer runs.
     #[arg(long)]

@@ -44,7 +44,7 @@ pub struct Options {
     #[arg(value_name = "SCENE", default_values_t = ["courtyard", "lamps", "plates"].map(String::from))]
     pub scenes: Vec<String>,
     /// Folder for figures; references are kept in it from run to run.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = crate::OUT)]
     pub out: PathBuf,
     /// A rough run of about two minutes: smaller pictures, fewer samples.
     #[arg(long)]

@@ -53,7 +53,7 @@ pub struct Options {
     #[arg(value_name = "SCENE", default_value = "courtyard")]
     pub scenes: Vec<String>,
     /// Folder for figures; references are kept in it from run to run.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", default_value = crate::OUT)]
     pub out: PathBuf,
     /// A rough run: a smaller picture, one budget, fewer references.
     #[arg(long)]

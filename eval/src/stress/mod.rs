@@ -55,7 +55,7 @@ const SUBJECTS: &[(&str, &[Case])] = &[
 #[derive(Args, Debug)]
 pub struct Options {
     /// Folder for stress.csv and stress.md.
-    #[arg(long, value_name = "DIR", default_value = "stress")]
+    #[arg(long, value_name = "DIR", default_value = crate::OUT)]
     pub out: PathBuf,
     /// Fewer samples: less than two minutes on two cores.
     #[arg(long)]
