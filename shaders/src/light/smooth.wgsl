@@ -20,8 +20,10 @@ const RADIUS: i32 = 3;
 const SMOOTHING_ERROR: f32 = 0.08;
 // Standard deviations of difference that still count as noise.
 const TOLERANCE: f32 = 3.0;
-// Relative standard deviation that a sample has at least.
+// Relative standard deviation that a sample has at least. Reflections of wide lamps
+// have hardly any, and shapes that smoothing would take from them.
 const LEAST_NOISE: f32 = 0.8;
+const LEAST_GLOSSY_NOISE: f32 = 0.2;
 // Samples of a texel by which the surroundings count half as much: they know less
 // and less that it does not know itself, and are wider than its window.
 const SURROUNDED_SAMPLES: f32 = 4.5;
@@ -35,9 +37,9 @@ fn variance_of(mean: f32, mean_square: f32, samples: f32) -> f32 {
 
 // How much a texel stands for itself beside what it is smoothed to. Samples that
 // all found nothing do not make it certain that there is nothing to find.
-fn own_share(variance: f32, samples: f32, smoothed: f32) -> f32 {
+fn own_share(variance: f32, samples: f32, least_noise: f32, smoothed: f32) -> f32 {
     let believed = SMOOTHING_ERROR * SMOOTHING_ERROR * smoothed * smoothed;
-    let least = LEAST_NOISE * LEAST_NOISE * smoothed * smoothed / max(samples, 0.02);
+    let least = least_noise * least_noise * smoothed * smoothed / max(samples, 0.02);
     return believed / max(believed + max(variance, least), 1e-20);
 }
 
@@ -109,8 +111,8 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             let trust = around.w / (1.0 + known * known);
             let smoothed = (sum + around.rgb * trust) / max(weights.x + trust, 1e-6);
             let smoothed_glossy = sum_glossy / max(weights.y, 1e-6);
-            diffuse_light = mix(smoothed, here.rgb, own_share(variance.x, here.w, luminance(smoothed)));
-            glossy_light = mix(smoothed_glossy, shiny.rgb, own_share(variance.y, shiny.w, luminance(smoothed_glossy)));
+            diffuse_light = mix(smoothed, here.rgb, own_share(variance.x, here.w, LEAST_NOISE, luminance(smoothed)));
+            glossy_light = mix(smoothed_glossy, shiny.rgb, own_share(variance.y, shiny.w, LEAST_GLOSSY_NOISE, luminance(smoothed_glossy)));
         }
         var light = s.emissive + diffuse_color(s) * diffuse_light + glossy_light;
         if (HAS_SUN) {
