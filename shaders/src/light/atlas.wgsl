@@ -44,7 +44,7 @@ struct BlockRecord {
 @group(2) @binding(6) var<storage, read_write> moments: array<vec4<f32>>;
 
 // Samples over which means run where a moving object was met.
-const MOVING_HISTORY: f32 = 16.0;
+const MOVING_HISTORY: f32 = 8.0;
 
 // Light of a path at most: its square fits single precision, and is white however
 // it is exposed.

@@ -23,7 +23,7 @@ const TOLERANCE: f32 = 3.0;
 // Relative standard deviation that a sample has at least. Reflections of wide lamps
 // have hardly any, and shapes that smoothing would take from them.
 const LEAST_NOISE: f32 = 0.8;
-const LEAST_GLOSSY_NOISE: f32 = 0.2;
+const LEAST_GLOSSY_NOISE: f32 = 0.5;
 // Samples of a texel by which the surroundings count half as much: they know less
 // and less that it does not know itself, and are wider than its window.
 const SURROUNDED_SAMPLES: f32 = 4.5;
