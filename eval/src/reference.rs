@@ -13,7 +13,6 @@ use std::{
 
 use anyhow::{Context, Result};
 use glam::Vec3;
-use image::{Rgb, Rgb32FImage};
 use sha2::{Digest, Sha256};
 use shadecast_server::{
     Integrator,
@@ -141,11 +140,7 @@ fn path_of(folder: &Path, name: &str, half: usize, samples: u32) -> PathBuf {
 fn keep(folder: &Path, name: &str, halves: &[Still; 2], samples: u32) -> Result<()> {
     std::fs::create_dir_all(folder)?;
     for (half, still) in halves.iter().enumerate() {
-        let mut picture = Rgb32FImage::new(still.width, still.height);
-        for (pixel, radiance) in picture.pixels_mut().zip(&still.radiance) {
-            *pixel = Rgb(radiance.to_array());
-        }
-        picture.save(path_of(folder, name, half, samples))?;
+        still.save_exr(&path_of(folder, name, half, samples))?;
     }
     Ok(())
 }

@@ -7,12 +7,11 @@ use std::{
 
 use anyhow::{Context, ensure};
 use glam::{DMat3, DQuat, DVec3};
-use image::{ImageResult, Rgb, Rgb32FImage};
 use shadecast_protocol::{Fov, Pose};
 use shadecast_server::{
     Integrator,
     scene::{EnvironmentMap, Light, Scene, SkyModel},
-    still::{Camera, Still, StillRenderer},
+    still::{Camera, StillRenderer},
 };
 
 use crate::{
@@ -76,7 +75,7 @@ pub(crate) fn render(arguments: &RenderArguments) -> anyhow::Result<()> {
 
     let cannot_write = |path: &Path| format!("cannot write {}", path.display());
     if let Some(exr) = &exr {
-        write_exr(&still, exr).with_context(|| cannot_write(exr))?;
+        still.save_exr(exr).with_context(|| cannot_write(exr))?;
     }
     let exposure = arguments
         .exposure
@@ -191,15 +190,6 @@ fn pose_from_view(view: &[f64; 16]) -> anyhow::Result<Pose> {
         position: (-(world_from_camera * translation)).as_vec3(),
         orientation: DQuat::from_mat3(&world_from_camera).normalize().as_quat(),
     })
-}
-
-/// Linear radiance, 32-bit floats.
-fn write_exr(still: &Still, path: &Path) -> ImageResult<()> {
-    let mut picture = Rgb32FImage::new(still.width, still.height);
-    for (pixel, radiance) in picture.pixels_mut().zip(&still.radiance) {
-        *pixel = Rgb(radiance.to_array());
-    }
-    picture.save(path)
 }
 
 #[cfg(test)]

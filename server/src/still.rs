@@ -1,10 +1,10 @@
 //! Still pictures through a pinhole camera, by the same paths as the atlas:
 //! what a client's picture is compared with.
 
-use std::time::Duration;
+use std::{path::Path, time::Duration};
 
 use glam::{Mat3, Quat, Vec3};
-use image::{Rgb, RgbImage};
+use image::{ImageFormat, ImageResult, Rgb, Rgb32FImage, RgbImage};
 use shadecast_protocol::{Fov, Pose};
 use shadecast_shaders::light::{STILL_SOURCE, StillParameters, rows_of_affine};
 use shadecast_shaders::picture::displayed as tone_map;
@@ -59,6 +59,18 @@ impl Still {
             *pixel = Rgb(tone_map(*radiance, exposure));
         }
         picture
+    }
+
+    /// Writes it as OpenEXR: linear radiance, 32-bit floats.
+    ///
+    /// # Errors
+    /// When the file cannot be written.
+    pub fn save_exr(&self, path: &Path) -> ImageResult<()> {
+        let mut picture = Rgb32FImage::new(self.width, self.height);
+        for (pixel, radiance) in picture.pixels_mut().zip(&self.radiance) {
+            *pixel = Rgb(radiance.to_array());
+        }
+        picture.save_with_format(path, ImageFormat::OpenExr)
     }
 
     /// The exposure that shows it at a middling brightness.
@@ -180,23 +192,14 @@ impl StillPass {
     /// # Errors
     /// When the driver fails.
     pub fn develop(&self, gpu: &Gpu, film: &Film) -> Result<Still, GpuError> {
-        let bytes = film.sum.size();
-        let readback = gpu.readback("still", bytes);
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&film.sum, 0, &readback, 0, bytes);
-        let radiance = gpu.submit_and_read(encoder, &readback, bytes, |bytes| {
-            bytemuck::cast_slice::<u8, [f32; 4]>(bytes)
-                .iter()
-                .map(|[r, g, b, count]| Vec3::new(*r, *g, *b) / count.max(1.0))
-                .collect()
-        })?;
+        let sums = gpu.read(&film.sum, 0..film.sum.size())?.into_iter();
         let [width, height] = film.size;
         Ok(Still {
             width,
             height,
-            radiance,
+            radiance: sums
+                .map(|[r, g, b, count]: [f32; 4]| Vec3::new(r, g, b) / count.max(1.0))
+                .collect(),
         })
     }
 

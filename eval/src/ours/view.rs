@@ -163,19 +163,14 @@ impl AtlasView {
             let (x, y) = workgroups(pixels, 64);
             pass.dispatch_workgroups(x, y, 1);
         }
-        let readback = gpu.readback("seen", bytes);
-        encoder.copy_buffer_to_buffer(&seen, 0, &readback, 0, bytes);
-        let radiance = gpu.submit_and_read(encoder, &readback, bytes, |bytes| {
-            bytemuck::cast_slice::<u8, [f32; 4]>(bytes)
-                .iter()
-                .map(|[r, g, b, _]| Vec3::new(*r, *g, *b))
-                .collect()
-        })?;
+        gpu.queue.submit([encoder.finish()]);
         let [width, height] = size;
         Ok(Still {
             width,
             height,
-            radiance,
+            radiance: (gpu.read(&seen, 0..bytes)?.into_iter())
+                .map(|[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b))
+                .collect(),
         })
     }
 }

@@ -21,8 +21,7 @@ const ATLAS: u16 = 512;
 
 /// Something that makes update after update of a moving view.
 pub(super) trait Contender {
-    /// Makes the update for this camera and time, of this much work. The first
-    /// after a long time has no history to go by.
+    /// Makes the update for this camera and time, of this much work.
     fn update(&mut self, camera: &Camera, time: Duration, work: u32) -> Result<Spent>;
 
     /// What is displayed of it.

@@ -83,8 +83,8 @@ struct Measured {
     scene: String,
     motion: Motion,
     rows: Vec<Row>,
-    /// The reference, and each method's picture, after the last update; the
-    /// second row of pictures in the middle of the trace.
+    /// The reference and each method's picture, in the middle of the trace and at
+    /// its end.
     strip: RgbImage,
     /// Mean relMSE of the references themselves.
     reference_noise: f64,

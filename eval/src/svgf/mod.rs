@@ -179,14 +179,6 @@ fn submit(gpu: &Gpu, record: impl FnOnce(&mut CommandEncoder)) {
 }
 
 fn read<T: Pod, U>(gpu: &Gpu, buffer: &Buffer, each: impl Fn(T) -> U) -> Result<Vec<U>, GpuError> {
-    let bytes = buffer.size();
-    let readback = gpu.readback("filtered", bytes);
-    let mut encoder = gpu
-        .device
-        .create_command_encoder(&CommandEncoderDescriptor::default());
-    encoder.copy_buffer_to_buffer(buffer, 0, &readback, 0, bytes);
-    gpu.submit_and_read(encoder, &readback, bytes, |bytes| {
-        let records = bytemuck::cast_slice::<u8, T>(bytes);
-        records.iter().map(|record| each(*record)).collect()
-    })
+    let records = gpu.read(buffer, 0..buffer.size())?;
+    Ok(records.into_iter().map(each).collect())
 }

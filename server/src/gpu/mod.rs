@@ -203,6 +203,24 @@ impl Gpu {
         Ok(result)
     }
 
+    /// What these bytes of a buffer hold; waits for all that was submitted.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn read<T: bytemuck::Pod>(
+        &self,
+        buffer: &wgpu::Buffer,
+        bytes: std::ops::Range<u64>,
+    ) -> Result<Vec<T>, GpuError> {
+        let size = bytes.end - bytes.start;
+        let readback = self.readback("readback", size);
+        let mut encoder = self
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        encoder.copy_buffer_to_buffer(buffer, bytes.start, &readback, 0, size);
+        self.submit_and_read(encoder, &readback, size, bytemuck::pod_collect_to_vec)
+    }
+
     /// A compute pipeline of `source` with `constants` for its overrides.
     #[must_use]
     pub fn compute_pipeline(

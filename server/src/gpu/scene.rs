@@ -32,7 +32,8 @@ const FAINT_SHARE: f32 = 0.01;
 /// halved until they fit.
 const TEXEL_SHARE: f64 = 0.9;
 
-/// How light is found. Whatever is switched off, the light is the same but for its noise: that is how `shadecast-eval` tells what each part is worth.
+/// How light is found. Whatever is switched off, the light is the same but for its
+/// noise: that is how `shadecast-eval` tells what each part is worth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Integrator {
     /// Indirect bounces; 0 is emission and direct light only.

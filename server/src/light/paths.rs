@@ -107,14 +107,9 @@ impl Paths {
     /// # Errors
     /// When the driver fails.
     pub fn rays(&self, gpu: &Gpu) -> Result<u64, GpuError> {
-        let readback = gpu.readback("rays", SUM_BYTES);
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        encoder.copy_buffer_to_buffer(&self.queued, LENGTH_BYTES, &readback, 0, SUM_BYTES);
-        gpu.submit_and_read(encoder, &readback, SUM_BYTES, |bytes| {
-            bytemuck::pod_read_unaligned(bytes)
-        })
+        // Lower word first, as 64-bit numbers lie in memory.
+        let sum = gpu.read::<u32>(&self.queued, LENGTH_BYTES..LENGTH_BYTES + SUM_BYTES)?;
+        Ok(u64::from(sum[0]) | u64::from(sum[1]) << 32)
     }
 
     /// Most paths in flight.

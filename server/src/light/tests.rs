@@ -120,7 +120,6 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
         alpha: 1.0,
     }]);
     let bytes = light.shown().size();
-    let readback = gpu.readback("shown", bytes);
 
     let at = |x, width, height| Block {
         x,
@@ -142,12 +141,8 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
         light
             .trace(&gpu, &gpu_scene, jobs, &job, VIEWER)
             .expect("light");
-        let mut encoder = (gpu.device).create_command_encoder(&Default::default());
-        encoder.copy_buffer_to_buffer(light.shown(), 0, &readback, 0, bytes);
         let shown: Vec<Vec4> = gpu
-            .submit_and_read(encoder, &readback, bytes, |bytes| {
-                bytemuck::pod_collect_to_vec(bytes)
-            })
+            .read(light.shown(), 0..bytes)
             .expect("the device answers");
 
         let (width, height) = block.level.size();

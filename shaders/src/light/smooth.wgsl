@@ -5,8 +5,8 @@
 // each neighbour counting by its samples and by how likely the difference is
 // noise; diffuse light besides over the surroundings in the world, which reach
 // across the borders of patches. All fades out as the texel's own error falls, so
-// that a still scene converges to what was traced. Colour, normal, emission and the sun's
-// reflection are those of the texel's middle: they are free of noise.
+// that a still scene converges to what was traced. Colour, normal, emission and the
+// sun's reflection are those of the texel's middle: they are free of noise.
 // One workgroup per block; reads the scene and what texels remember, writes `shown`.
 // Source: Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017,
 // sections 4.1 and 4.4, with one small window instead of a pyramid.

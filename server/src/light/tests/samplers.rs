@@ -52,7 +52,6 @@ impl Bench {
             .storage("inputs", bytemuck::cast_slice(inputs))
             .expect("room");
         let outputs = gpu.scratch("outputs", bytes).expect("room");
-        let readback = gpu.readback("outputs", bytes);
         let source = [
             ADVANCE_SOURCE,
             include_str!("samplers/samplers.wgsl"),
@@ -71,9 +70,8 @@ impl Bench {
             let (x, y) = workgroups(count as u32, 64);
             pass.dispatch_workgroups(x, y, 1);
         }
-        encoder.copy_buffer_to_buffer(&outputs, 0, &readback, 0, bytes);
-        gpu.submit_and_read(encoder, &readback, bytes, bytemuck::pod_collect_to_vec)
-            .expect("the device answers")
+        gpu.queue.submit([encoder.finish()]);
+        gpu.read(&outputs, 0..bytes).expect("the device answers")
     }
 }
 
