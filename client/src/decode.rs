@@ -4,19 +4,24 @@
 //! no B frames and no delay. Whatever goes wrong with a unit comes back as the
 //! result of that unit, so that the session can ask for a new start. Decoders of
 //! the platform (MediaCodec) answer later than they are asked, hence the split
-//! into [`Decoder::send`] and [`Decoder::poll`].
+//! into [`Decoder::send`] and [`Decoder::poll`]; what else they do to the order
+//! of things, [`PlatformDecoder`] undoes. All pass the tests in `conformance`.
 
+#[cfg(all(test, feature = "openh264"))]
+mod conformance;
 #[cfg(feature = "openh264")]
 mod openh264;
+mod platform;
 mod thread;
 
 use shadecast_protocol::FrameId;
 use thiserror::Error;
 
-use crate::YuvPicture;
+use crate::DecodedPicture;
 
 #[cfg(feature = "openh264")]
 pub use self::openh264::OpenH264Decoder;
+pub use platform::{PlatformCodec, PlatformDecoder};
 pub use thread::{DecoderGone, DecoderThread};
 
 /// Names an access unit on its way through a decoder.
@@ -46,12 +51,12 @@ pub struct AccessUnit {
 }
 
 /// What became of an access unit.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Decoded {
     /// The unit.
     pub ticket: Ticket,
     /// Its picture.
-    pub picture: Result<YuvPicture, DecodeError>,
+    pub picture: Result<DecodedPicture, DecodeError>,
 }
 
 /// Why an access unit gave no picture. The stream can go on at the next
@@ -80,14 +85,13 @@ pub enum DecodeError {
 
 /// A video decoder.
 ///
-/// Every unit that was sent comes back exactly once from `poll`, in the order
-/// of sending, unless [`flush`](Self::flush) comes between.
+/// Every unit that was sent comes back at most once from `poll`, in the order of
+/// sending, and not after a [`flush`](Self::flush) that came between. One that
+/// never comes back was the last: a later one takes it with it, or the session
+/// loses patience. It may be dropped with units inside.
 pub trait Decoder {
     /// Takes the next access unit.
-    ///
-    /// # Errors
-    /// The unit is refused; it does not come back from `poll`.
-    fn send(&mut self, unit: AccessUnit) -> Result<(), DecodeError>;
+    fn send(&mut self, unit: AccessUnit);
 
     /// The next result that is ready; does not wait for one.
     fn poll(&mut self) -> Option<Decoded>;

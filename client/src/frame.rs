@@ -4,6 +4,8 @@
 //! met its update; the drawing side switches to the newest one between two
 //! display frames and never waits for it (SAS 2018, sections 3.5 and 3.6).
 
+use std::any::Any;
+use std::fmt;
 use std::sync::Arc;
 
 use shadecast_protocol::{ClientTime, Epoch, FrameId, Motion, Pose, UpdateTiming};
@@ -21,7 +23,7 @@ pub struct DrawVertex {
 }
 
 /// A decoded 4:2:0 picture, limited-range BT.709, planes without padding.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct YuvPicture {
     /// In texels, even.
     pub width: u32,
@@ -33,6 +35,72 @@ pub struct YuvPicture {
     pub u: Vec<u8>,
     /// `width * height / 4` bytes.
     pub v: Vec<u8>,
+}
+
+impl fmt::Debug for YuvPicture {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("YuvPicture")
+            .field("width", &self.width)
+            .field("height", &self.height)
+            .finish_non_exhaustive()
+    }
+}
+
+/// A decoded picture, wherever the decoder left it.
+#[derive(Clone, Debug)]
+pub enum DecodedPicture {
+    /// In memory, as software decoders do.
+    Planes(Arc<YuvPicture>),
+    /// In a buffer of the platform, as hardware decoders do.
+    Foreign(ForeignPicture),
+}
+
+/// A picture that only the platform can reach. What draws knows the type of the
+/// image; everything between decoder and GPU passes it on unseen, and the last
+/// one to let go of it gives the buffer back to the decoder.
+#[derive(Clone, Debug)]
+pub struct ForeignPicture {
+    /// Width and height, texels.
+    pub size: [u32; 2],
+    /// The buffer.
+    pub image: Arc<dyn Any + Send + Sync>,
+}
+
+impl DecodedPicture {
+    /// Width and height, texels.
+    #[must_use]
+    pub fn size(&self) -> [u32; 2] {
+        match self {
+            Self::Planes(picture) => [picture.width, picture.height],
+            Self::Foreign(picture) => picture.size,
+        }
+    }
+
+    /// The picture, where it lies in memory.
+    #[must_use]
+    pub fn planes(&self) -> Option<&YuvPicture> {
+        match self {
+            Self::Planes(picture) => Some(picture),
+            Self::Foreign(_) => None,
+        }
+    }
+}
+
+impl From<YuvPicture> for DecodedPicture {
+    fn from(picture: YuvPicture) -> Self {
+        Self::Planes(Arc::new(picture))
+    }
+}
+
+/// Pictures in memory are compared by content, others by identity.
+impl PartialEq for DecodedPicture {
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Planes(a), Self::Planes(b)) => a == b,
+            (Self::Foreign(a), Self::Foreign(b)) => Arc::ptr_eq(&a.image, &b.image),
+            (Self::Planes(_), Self::Foreign(_)) | (Self::Foreign(_), Self::Planes(_)) => false,
+        }
+    }
 }
 
 /// Where an alpha-masked patch is there: one byte a texel of the atlas, 255 or
@@ -84,7 +152,7 @@ pub struct ClientFrame {
     /// `world_from_object` of every object; index 0 is the identity.
     pub motions: Arc<Vec<Motion>>,
     /// The shading.
-    pub picture: Arc<YuvPicture>,
+    pub picture: DecodedPicture,
     /// Present only where a placed patch is alpha-masked.
     pub masks: Option<Arc<MaskAtlas>>,
     /// Patches placed.

@@ -155,7 +155,7 @@ mod tests {
     use shadecast_protocol::{Epoch, Pose, UpdateTiming, ViewSeq};
 
     use super::*;
-    use crate::{ClientTiming, YuvPicture};
+    use crate::{ClientTiming, DecodedPicture, YuvPicture};
 
     const MS: u64 = 1_000_000;
 
@@ -183,7 +183,7 @@ mod tests {
             opaque_indices: 0,
             objects_lead: 0,
             motions: Arc::default(),
-            picture: Arc::new(YuvPicture {
+            picture: DecodedPicture::from(YuvPicture {
                 width: 0,
                 height: 0,
                 y: vec![],

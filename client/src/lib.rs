@@ -14,8 +14,13 @@ mod world;
 pub use clock::ClockEstimate;
 #[cfg(feature = "openh264")]
 pub use decode::OpenH264Decoder;
-pub use decode::{AccessUnit, DecodeError, Decoded, Decoder, DecoderGone, DecoderThread, Ticket};
-pub use frame::{ClientFrame, ClientTiming, DrawVertex, MaskAtlas, YuvPicture};
+pub use decode::{
+    AccessUnit, DecodeError, Decoded, Decoder, DecoderGone, DecoderThread, PlatformCodec,
+    PlatformDecoder, Ticket,
+};
+pub use frame::{
+    ClientFrame, ClientTiming, DecodedPicture, DrawVertex, ForeignPicture, MaskAtlas, YuvPicture,
+};
 pub use latency::{Drawn, Latency, LatencySummary};
 pub use session::{
     Disconnection, Failure, HeadView, Input, Output, Session, SessionConfig, Status,

@@ -19,7 +19,7 @@ use shadecast_protocol::{
     Block, Epoch, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Pose, Update, VertexId,
 };
 
-use crate::{ClientFrame, ClientTiming, DrawVertex, MaskAtlas, YuvPicture};
+use crate::{ClientFrame, ClientTiming, DecodedPicture, DrawVertex, MaskAtlas};
 
 pub use check::WorldError;
 
@@ -130,7 +130,7 @@ impl World {
     pub fn frame(
         &mut self,
         update: &Update,
-        picture: Arc<YuvPicture>,
+        picture: DecodedPicture,
         timing: ClientTiming,
     ) -> ClientFrame {
         let geometry = self

@@ -286,7 +286,7 @@ impl Loopback {
                         self.upstream.send(self.now, order, message.encode()?);
                     }
                     Output::Decode(unit) => {
-                        self.decoder.send(unit)?;
+                        self.decoder.send(unit);
                         inputs.extend(self.decoder.poll().map(Input::Decoded));
                     }
                     Output::Present(frame) => {

@@ -10,7 +10,7 @@ use thiserror::Error;
 use super::{AccessUnit, Decoded, Decoder};
 
 /// Units that wait for the decoder; the session has fewer on their way.
-const QUEUED_UNITS: usize = 8;
+const QUEUED_UNITS: usize = 16;
 
 /// How often a decoder that owes a picture is asked for it. Decoders that
 /// answer at once never wait this long.
@@ -32,8 +32,8 @@ pub struct DecoderThread {
 }
 
 impl DecoderThread {
-    /// Starts the thread. It calls `on_decoded` once for every unit, in order;
-    /// units that a restart overtakes are left out. `on_decoded` usually sends
+    /// Starts the thread. It calls `on_decoded` for every unit, in order, as far
+    /// as the decoder answers; units that a restart overtakes are left out. `on_decoded` usually sends
     /// into the channel from which the session is fed.
     ///
     /// # Errors
@@ -94,14 +94,8 @@ fn run(
                     decoder.flush();
                     owed = 0;
                 }
-                let ticket = unit.ticket;
-                match decoder.send(unit) {
-                    Ok(()) => owed += 1,
-                    Err(error) => on_decoded(Decoded {
-                        ticket,
-                        picture: Err(error),
-                    }),
-                }
+                decoder.send(unit);
+                owed += 1;
             }
             Err(RecvTimeoutError::Timeout) => {}
             Err(RecvTimeoutError::Disconnected) => return,
@@ -121,8 +115,8 @@ mod tests {
     use shadecast_protocol::FrameId;
 
     use super::*;
-    use crate::YuvPicture;
-    use crate::decode::{DecodeError, Ticket};
+    use crate::decode::Ticket;
+    use crate::{DecodedPicture, YuvPicture};
 
     /// Gives a result only at the third time of asking, as hardware does.
     #[derive(Default)]
@@ -132,12 +126,8 @@ mod tests {
     }
 
     impl Decoder for SlowDecoder {
-        fn send(&mut self, unit: AccessUnit) -> Result<(), DecodeError> {
-            if unit.bytes.is_empty() {
-                return Err(DecodeError::NoPicture);
-            }
+        fn send(&mut self, unit: AccessUnit) {
             self.inside.push_back(unit.ticket);
-            Ok(())
         }
 
         fn poll(&mut self) -> Option<Decoded> {
@@ -146,13 +136,13 @@ mod tests {
                 return None;
             }
             let ticket = self.inside.pop_front()?;
-            let picture = Ok(YuvPicture {
+            let picture = Ok(DecodedPicture::from(YuvPicture {
                 width: 0,
                 height: 0,
                 y: vec![],
                 u: vec![],
                 v: vec![],
-            });
+            }));
             Some(Decoded { ticket, picture })
         }
 
@@ -189,19 +179,6 @@ mod tests {
         }
         drop(thread);
         assert!(received.recv().is_err(), "the thread has ended");
-    }
-
-    #[test]
-    fn a_refused_unit_comes_back_as_its_error() {
-        let (results, received) = channel();
-        let thread = DecoderThread::spawn(SlowDecoder::default(), move |decoded| {
-            results.send(decoded).unwrap();
-        })
-        .unwrap();
-        thread.send(unit(4, &[])).unwrap();
-        let decoded = received.recv_timeout(Duration::from_secs(10)).unwrap();
-        assert_eq!(decoded.ticket.frame, FrameId(4));
-        assert_eq!(decoded.picture, Err(DecodeError::NoPicture));
     }
 
     #[test]

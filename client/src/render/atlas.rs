@@ -1,37 +1,40 @@
-//! The decoded picture as a texture to sample: three planes become RGBA once
-//! for each picture, and never again for the pixels that look it up.
+//! The decoded picture as a texture to sample. It becomes RGBA once for each
+//! picture, and never again for the pixels that look it up: planes in memory by
+//! `planes`, what a hardware decoder left on the GPU by `foreign`.
 
 use std::sync::Arc;
 
-use super::cover::{cover_pass, cover_pipeline};
+#[cfg(feature = "vulkan")]
+use super::foreign::Converter;
 use super::pipelines::Layouts;
-use crate::{ClientFrame, MaskAtlas, YuvPicture};
+use super::planes::{Planes, plane, write_plane};
+use super::renderer::UploadError;
+use crate::{ClientFrame, DecodedPicture, ForeignPicture, MaskAtlas};
 
 /// The atlas holds display-encoded colours. An sRGB eye samples it through an
 /// sRGB view, any other eye through this plain one; either way what is drawn is
 /// what was decoded.
-const PLAIN: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+pub(super) const PLAIN: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 const SRGB: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
 
-/// Converts pictures and keeps the textures of the current size.
+/// Converts pictures and keeps the newest.
 #[derive(Debug)]
 pub(super) struct Atlas {
-    convert: wgpu::RenderPipeline,
     sampler: wgpu::Sampler,
     sampled_as: wgpu::TextureFormat,
-    current: Option<Textures>,
+    /// Built with the first picture in memory.
+    planes: Option<Planes>,
+    #[cfg(feature = "vulkan")]
+    pub(super) foreign: Option<Converter>,
+    current: Option<Sampled>,
     mask: Option<Mask>,
 }
 
-/// Everything that depends on the size of the picture.
+/// A converted picture and how the shaders see it.
 #[derive(Debug)]
-struct Textures {
-    size: [u32; 2],
-    planes: [wgpu::Texture; 3],
+struct Sampled {
     rgba: wgpu::Texture,
-    drawn: wgpu::TextureView,
-    convert_group: wgpu::BindGroup,
-    sample_group: wgpu::BindGroup,
+    group: wgpu::BindGroup,
 }
 
 #[derive(Debug)]
@@ -43,10 +46,7 @@ struct Mask {
 
 impl Atlas {
     pub(super) fn new(device: &wgpu::Device, eye_format: wgpu::TextureFormat) -> Self {
-        let module = device.create_shader_module(wgpu::include_wgsl!("yuv.wgsl"));
-        let convert = cover_pipeline(device, &module, "rgb_from_yuv", None, &[], PLAIN);
         Self {
-            convert,
             sampler: device.create_sampler(&wgpu::SamplerDescriptor {
                 label: Some("atlas"),
                 mag_filter: wgpu::FilterMode::Linear,
@@ -54,90 +54,83 @@ impl Atlas {
                 ..wgpu::SamplerDescriptor::default()
             }),
             sampled_as: if eye_format.is_srgb() { SRGB } else { PLAIN },
+            planes: None,
+            #[cfg(feature = "vulkan")]
+            foreign: None,
             current: None,
             mask: None,
         }
     }
 
     /// Takes over the frame's picture and masks. The frame has been checked.
+    ///
+    /// # Errors
+    /// A picture of the platform cannot be converted; nothing has changed.
     pub(super) fn upload(
         &mut self,
         device: &wgpu::Device,
         queue: &wgpu::Queue,
         layouts: &Layouts,
         frame: &ClientFrame,
-    ) {
-        let picture = &*frame.picture;
-        let size = [picture.width, picture.height];
-        if self
-            .current
-            .as_ref()
-            .is_none_or(|current| current.size != size)
-        {
-            self.current = Some(self.textures(device, layouts, size));
-        }
-        if let Some(current) = &self.current {
-            convert(device, queue, &self.convert, current, picture);
+    ) -> Result<(), UploadError> {
+        let rgba = match &frame.picture {
+            DecodedPicture::Planes(picture) => self
+                .planes
+                .get_or_insert_with(|| Planes::new(device))
+                .convert(device, queue, picture),
+            DecodedPicture::Foreign(picture) => self.convert_foreign(queue, picture)?,
+        };
+        if self.texture() != Some(&rgba) {
+            self.current = Some(self.sampled(device, layouts, rgba));
         }
         match &frame.masks {
             None => self.mask = None,
             Some(masks) => self.upload_mask(device, queue, layouts, masks),
         }
+        Ok(())
     }
 
-    fn textures(&self, device: &wgpu::Device, layouts: &Layouts, size: [u32; 2]) -> Textures {
-        let [width, height] = size;
-        let planes = [
-            plane(device, "luma", [width, height]),
-            plane(device, "blue chroma", [width / 2, height / 2]),
-            plane(device, "red chroma", [width / 2, height / 2]),
-        ];
-        let rgba = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("atlas"),
-            size: extent(size),
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format: PLAIN,
-            usage: wgpu::TextureUsages::RENDER_ATTACHMENT
-                | wgpu::TextureUsages::TEXTURE_BINDING
-                | wgpu::TextureUsages::COPY_SRC,
-            view_formats: &[SRGB],
-        });
-        let plane_views = planes.each_ref().map(default_view);
-        let sampled = rgba.create_view(&wgpu::TextureViewDescriptor {
+    #[cfg(feature = "vulkan")]
+    fn convert_foreign(
+        &mut self,
+        queue: &wgpu::Queue,
+        picture: &ForeignPicture,
+    ) -> Result<wgpu::Texture, UploadError> {
+        let converter = self.foreign.as_mut().ok_or(UploadError::NoConverter)?;
+        Ok(converter.convert(queue, picture)?)
+    }
+
+    #[cfg(not(feature = "vulkan"))]
+    #[expect(clippy::unused_self, reason = "the other one needs it")]
+    fn convert_foreign(
+        &mut self,
+        _: &wgpu::Queue,
+        _: &ForeignPicture,
+    ) -> Result<wgpu::Texture, UploadError> {
+        Err(UploadError::NoConverter)
+    }
+
+    fn sampled(&self, device: &wgpu::Device, layouts: &Layouts, rgba: wgpu::Texture) -> Sampled {
+        let view = rgba.create_view(&wgpu::TextureViewDescriptor {
             format: Some(self.sampled_as),
             usage: Some(wgpu::TextureUsages::TEXTURE_BINDING),
             ..wgpu::TextureViewDescriptor::default()
         });
-        Textures {
-            size,
-            convert_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("planes"),
-                layout: &self.convert.get_bind_group_layout(0),
-                entries: &[0, 1, 2].map(|n| wgpu::BindGroupEntry {
-                    binding: n,
-                    resource: wgpu::BindingResource::TextureView(&plane_views[n as usize]),
-                }),
-            }),
-            sample_group: device.create_bind_group(&wgpu::BindGroupDescriptor {
-                label: Some("atlas"),
-                layout: &layouts.atlas,
-                entries: &[
-                    wgpu::BindGroupEntry {
-                        binding: 0,
-                        resource: wgpu::BindingResource::TextureView(&sampled),
-                    },
-                    wgpu::BindGroupEntry {
-                        binding: 1,
-                        resource: wgpu::BindingResource::Sampler(&self.sampler),
-                    },
-                ],
-            }),
-            planes,
-            drawn: default_view(&rgba),
-            rgba,
-        }
+        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
+            label: Some("atlas"),
+            layout: &layouts.atlas,
+            entries: &[
+                wgpu::BindGroupEntry {
+                    binding: 0,
+                    resource: wgpu::BindingResource::TextureView(&view),
+                },
+                wgpu::BindGroupEntry {
+                    binding: 1,
+                    resource: wgpu::BindingResource::Sampler(&self.sampler),
+                },
+            ],
+        });
+        Sampled { rgba, group }
     }
 
     fn upload_mask(
@@ -177,7 +170,7 @@ impl Atlas {
 
     /// What the patches sample; none before the first picture.
     pub(super) fn group(&self) -> Option<&wgpu::BindGroup> {
-        self.current.as_ref().map(|current| &current.sample_group)
+        self.current.as_ref().map(|current| &current.group)
     }
 
     /// Present only where the frame has masks.
@@ -191,56 +184,23 @@ impl Atlas {
     }
 }
 
-fn convert(
-    device: &wgpu::Device,
-    queue: &wgpu::Queue,
-    pipeline: &wgpu::RenderPipeline,
-    textures: &Textures,
-    picture: &YuvPicture,
-) {
-    for (plane, bytes) in textures
-        .planes
-        .iter()
-        .zip([&picture.y, &picture.u, &picture.v])
-    {
-        write_plane(queue, plane, bytes);
-    }
-    let mut encoder = device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    let mut pass = cover_pass(&mut encoder, "RGB from YUV", &textures.drawn);
-    pass.set_pipeline(pipeline);
-    pass.set_bind_group(0, &textures.convert_group, &[]);
-    pass.draw(0..3, 0..1);
-    drop(pass);
-    queue.submit([encoder.finish()]);
-}
-
-fn plane(device: &wgpu::Device, label: &str, size: [u32; 2]) -> wgpu::Texture {
+/// What a picture is converted into.
+pub(super) fn target(device: &wgpu::Device, size: [u32; 2]) -> wgpu::Texture {
     device.create_texture(&wgpu::TextureDescriptor {
-        label: Some(label),
+        label: Some("atlas"),
         size: extent(size),
         mip_level_count: 1,
         sample_count: 1,
         dimension: wgpu::TextureDimension::D2,
-        format: wgpu::TextureFormat::R8Unorm,
-        usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
+        format: PLAIN,
+        usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+            | wgpu::TextureUsages::TEXTURE_BINDING
+            | wgpu::TextureUsages::COPY_SRC,
+        view_formats: &[SRGB],
     })
 }
 
-fn write_plane(queue: &wgpu::Queue, plane: &wgpu::Texture, bytes: &[u8]) {
-    queue.write_texture(
-        plane.as_image_copy(),
-        bytes,
-        wgpu::TexelCopyBufferLayout {
-            offset: 0,
-            bytes_per_row: Some(plane.width()),
-            rows_per_image: None,
-        },
-        plane.size(),
-    );
-}
-
-fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
+pub(super) fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
     wgpu::Extent3d {
         width,
         height,
@@ -248,6 +208,6 @@ fn extent([width, height]: [u32; 2]) -> wgpu::Extent3d {
     }
 }
 
-fn default_view(texture: &wgpu::Texture) -> wgpu::TextureView {
+pub(super) fn default_view(texture: &wgpu::Texture) -> wgpu::TextureView {
     texture.create_view(&wgpu::TextureViewDescriptor::default())
 }

@@ -10,11 +10,14 @@
 mod atlas;
 mod cover;
 mod eyes;
+#[cfg(feature = "vulkan")]
+pub mod foreign;
 mod gpu;
 mod handover;
 mod lens;
 mod mesh;
 mod pipelines;
+mod planes;
 mod readback;
 mod renderer;
 mod shrink;

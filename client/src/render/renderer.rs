@@ -4,7 +4,7 @@ use glam::Mat4;
 use shadecast_protocol::Sky;
 use thiserror::Error;
 
-use crate::{ClientFrame, MaskAtlas, YuvPicture};
+use crate::{ClientFrame, DecodedPicture, MaskAtlas, YuvPicture};
 
 use super::atlas::Atlas;
 use super::mesh::Mesh;
@@ -27,7 +27,7 @@ pub struct RendererConfig {
 }
 
 /// Why a frame cannot be drawn on this device. The frame before it stays.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum UploadError {
     /// A plane does not have as many bytes as its size says, or no bytes at all.
     #[error("the {plane} of a {width}x{height} picture has {bytes} bytes")]
@@ -59,6 +59,14 @@ pub enum UploadError {
         /// Largest buffer.
         limit: u64,
     },
+    /// The picture is one of the platform's decoder, and nothing here knows how
+    /// to reach those.
+    #[error("a picture of the platform's decoder, which this renderer cannot reach")]
+    NoConverter,
+    /// A picture of the platform's decoder did not become RGBA.
+    #[cfg(feature = "vulkan")]
+    #[error(transparent)]
+    Convert(#[from] super::foreign::ConvertError),
 }
 
 /// Draws frames into the eyes of a headset.
@@ -109,6 +117,21 @@ impl Renderer {
         });
     }
 
+    /// From now on pictures of the platform's decoder are reached through
+    /// `images`.
+    ///
+    /// # Errors
+    /// The device is not one of Vulkan, or has no room.
+    #[cfg(feature = "vulkan")]
+    pub fn set_image_source(
+        &mut self,
+        images: Box<dyn super::foreign::ImageSource>,
+    ) -> Result<(), super::foreign::ConvertError> {
+        let converter = super::foreign::Converter::new(&self.device, images)?;
+        self.atlas.foreign = Some(converter);
+        Ok(())
+    }
+
     /// Switches to another frame, whole.
     ///
     /// # Errors
@@ -117,7 +140,7 @@ impl Renderer {
         check(frame, &self.device.limits())?;
         let (device, queue) = (&self.device, &self.queue);
         self.atlas
-            .upload(device, queue, self.pipelines.layouts(), frame);
+            .upload(device, queue, self.pipelines.layouts(), frame)?;
         if self.mesh.upload(device, queue, frame) {
             self.objects = self.mesh.transforms().map(|buffer| {
                 device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -251,14 +274,7 @@ impl Renderer {
 }
 
 fn check(frame: &ClientFrame, limits: &wgpu::Limits) -> Result<(), UploadError> {
-    let YuvPicture {
-        width,
-        height,
-        y,
-        u,
-        v,
-    } = &*frame.picture;
-    let (width, height) = (*width, *height);
+    let [width, height] = frame.picture.size();
     let limit = limits.max_texture_dimension_2d;
     if width > limit || height > limit {
         return Err(UploadError::Atlas {
@@ -267,28 +283,15 @@ fn check(frame: &ClientFrame, limits: &wgpu::Limits) -> Result<(), UploadError> 
             limit,
         });
     }
-    let quarter = (width / 2) as usize * (height / 2) as usize;
-    let whole = quarter * 4;
-    for (plane, bytes, expected) in [
-        ("luma", y.len(), whole),
-        ("blue chroma", u.len(), quarter),
-        ("red chroma", v.len(), quarter),
-    ] {
-        if bytes != expected || bytes == 0 || width % 2 == 1 || height % 2 == 1 {
-            return Err(UploadError::Plane {
-                plane,
-                width,
-                height,
-                bytes,
-            });
-        }
+    if let DecodedPicture::Planes(picture) = &frame.picture {
+        check_planes(picture)?;
     }
     if let Some(MaskAtlas {
         width: w,
         height: h,
         coverage,
     }) = frame.masks.as_deref()
-        && (coverage.len() != whole || [*w, *h] != [width, height])
+        && (coverage.len() != width as usize * height as usize || [*w, *h] != [width, height])
     {
         return Err(UploadError::Plane {
             plane: "mask",
@@ -301,6 +304,33 @@ fn check(frame: &ClientFrame, limits: &wgpu::Limits) -> Result<(), UploadError> 
     let limit = limits.max_buffer_size;
     if bytes > limit {
         return Err(UploadError::Geometry { bytes, limit });
+    }
+    Ok(())
+}
+
+fn check_planes(picture: &YuvPicture) -> Result<(), UploadError> {
+    let YuvPicture {
+        width,
+        height,
+        y,
+        u,
+        v,
+    } = picture;
+    let (width, height) = (*width, *height);
+    let quarter = (width / 2) as usize * (height / 2) as usize;
+    for (plane, bytes, expected) in [
+        ("luma", y.len(), quarter * 4),
+        ("blue chroma", u.len(), quarter),
+        ("red chroma", v.len(), quarter),
+    ] {
+        if bytes != expected || bytes == 0 || width % 2 == 1 || height % 2 == 1 {
+            return Err(UploadError::Plane {
+                plane,
+                width,
+                height,
+                bytes,
+            });
+        }
     }
     Ok(())
 }

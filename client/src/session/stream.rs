@@ -19,12 +19,13 @@ use shadecast_protocol::{
 use super::inbox::Inbox;
 use super::{Output, Status, elapsed};
 use crate::{
-    AccessUnit, ClientTiming, ClockEstimate, Decoded, Ticket, World, WorldError, YuvPicture,
+    AccessUnit, ClientTiming, ClockEstimate, Decoded, DecodedPicture, Ticket, World, WorldError,
 };
 
 /// Pictures with the decoder or decoded, waiting for their updates: enough for
-/// a decoder with a pipeline, and few, because each holds a whole picture.
-const MAX_IN_FLIGHT: usize = 4;
+/// hardware that gives its first picture when it has been sent several, and few,
+/// because each may hold a whole picture.
+const MAX_IN_FLIGHT: usize = 8;
 
 /// A picture that is missing this long while later ones arrive was lost. Streams
 /// of their own arrive a few round trips apart at most.
@@ -34,6 +35,10 @@ const PICTURE_PATIENCE: Duration = Duration::from_millis(250);
 /// be sent. Updates are not lost, only slow: a first one holds the geometry of a
 /// whole view.
 const UPDATE_PATIENCE: Duration = Duration::from_secs(2);
+
+/// A decoder that has answered nothing for this long is stuck. Hardware takes a
+/// few tenths of a second to open.
+const DECODER_PATIENCE: Duration = Duration::from_secs(1);
 
 /// Least time between two requests for a reset; doubles up to three times
 /// while none is answered, for a server that takes long to make a picture.
@@ -80,12 +85,13 @@ struct InFlight {
     epoch: Epoch,
     idr: bool,
     received: ClientTime,
-    decoded: Option<YuvPicture>,
+    decoded: Option<DecodedPicture>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Missing {
     Picture(FrameId),
+    Decoded(FrameId),
     Update(FrameId),
 }
 
@@ -290,7 +296,7 @@ impl Stream {
                 .client_minus_server()
                 .unwrap_or_else(|| offset_without_samples(&update.timing)),
         };
-        let shown = self.world.frame(&update, Arc::new(picture), timing);
+        let shown = self.world.frame(&update, picture, timing);
         if self.presented.is_none() || is_start {
             outputs.push_back(Output::Status(Status::Streaming));
         }
@@ -308,20 +314,26 @@ impl Stream {
         if let Some((missing, since)) = self.stuck {
             let patience = match missing {
                 Missing::Picture(_) => PICTURE_PATIENCE,
+                Missing::Decoded(_) => DECODER_PATIENCE,
                 Missing::Update(_) => UPDATE_PATIENCE,
             };
             if elapsed(since, now) > patience {
                 tracing::warn!(?missing, "a frame is lost");
-                self.lose(ResetReason::Gap);
+                self.lose(match missing {
+                    Missing::Decoded(_) => ResetReason::Decoder,
+                    Missing::Picture(_) | Missing::Update(_) => ResetReason::Gap,
+                });
             }
         }
         self.ask_for_reset(now, outputs);
     }
 
     fn missing(&self) -> Option<Missing> {
-        let front = self.in_flight.front();
-        if let Some(front) = front.filter(|front| front.decoded.is_some()) {
-            return Some(Missing::Update(front.frame));
+        if let Some(front) = self.in_flight.front() {
+            return Some(match front.decoded {
+                Some(_) => Missing::Update(front.frame),
+                None => Missing::Decoded(front.frame),
+            });
         }
         let first = self.pictures.first_frame()?;
         match self.phase {

@@ -64,7 +64,7 @@ impl Client {
             if let Output::Decode(unit) = &outputs[seen] {
                 let decoded = Decoded {
                     ticket: unit.ticket,
-                    picture: Ok(picture_of(&unit.bytes)),
+                    picture: Ok(picture_of(&unit.bytes).into()),
                 };
                 let more = self.input(Input::Decoded(decoded));
                 outputs.extend(more);
@@ -375,7 +375,7 @@ fn a_restarted_server_starts_from_nothing() {
             frame: FrameId(1),
             ..late.ticket
         },
-        picture: Ok(picture_of(&late.bytes)),
+        picture: Ok(picture_of(&late.bytes).into()),
     };
     assert_eq!(presented(&client.input(Input::Decoded(stale))), [0; 0]);
 }

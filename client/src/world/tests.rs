@@ -12,6 +12,7 @@ use shadecast_protocol::{
 };
 
 use super::*;
+use crate::YuvPicture;
 
 fn update(epoch: u32) -> Update {
     Update {
@@ -83,8 +84,8 @@ fn world() -> World {
     world
 }
 
-fn picture() -> Arc<YuvPicture> {
-    Arc::new(YuvPicture {
+fn picture() -> DecodedPicture {
+    DecodedPicture::from(YuvPicture {
         width: 0,
         height: 0,
         y: vec![],

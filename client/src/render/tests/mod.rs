@@ -35,15 +35,15 @@ fn gpu(stereo: Stereo) -> Gpu {
 }
 
 /// Draws and keeps what it draws into.
-struct Bench {
-    gpu: Gpu,
-    renderer: Renderer,
+pub(super) struct Bench {
+    pub(super) gpu: Gpu,
+    pub(super) renderer: Renderer,
     eyes: EyeImages,
     seconds_of_motion: f32,
 }
 
 impl Bench {
-    fn new(stereo: Stereo) -> Self {
+    pub(super) fn new(stereo: Stereo) -> Self {
         Self::with(RendererConfig {
             eye_size: [SIZE; 2],
             eye_format: FORMAT,
@@ -81,12 +81,12 @@ impl Bench {
     }
 
     /// What a single eye sees.
-    fn look(&self, world_from_eye: Pose) -> Pixels {
+    pub(super) fn look(&self, world_from_eye: Pose) -> Pixels {
         let [left, _] = self.draw([camera(world_from_eye); 2]);
         left
     }
 
-    fn encoder(&self) -> wgpu::CommandEncoder {
+    pub(super) fn encoder(&self) -> wgpu::CommandEncoder {
         self.gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
@@ -112,7 +112,7 @@ fn eyes() -> [EyeView; 2] {
     })
 }
 
-fn at(position: Vec3) -> Pose {
+pub(super) fn at(position: Vec3) -> Pose {
     Pose {
         position,
         orientation: Quat::IDENTITY,
@@ -120,7 +120,7 @@ fn at(position: Vec3) -> Pose {
 }
 
 /// A picture whose 2x2 blocks have the YCbCr values that `color` gives.
-fn picture(side: u32, color: impl Fn(u32, u32) -> [u8; 3]) -> YuvPicture {
+pub(super) fn picture(side: u32, color: impl Fn(u32, u32) -> [u8; 3]) -> YuvPicture {
     let blocks = || (0..side / 2).flat_map(|y| (0..side / 2).map(move |x| (x, y)));
     YuvPicture {
         width: side,
@@ -146,7 +146,7 @@ fn four_colors() -> YuvPicture {
 
 /// Upright rectangles that face +Z.
 #[derive(Default)]
-struct Geometry {
+pub(super) struct Geometry {
     vertices: Vec<DrawVertex>,
     indices: Vec<u32>,
 }
@@ -172,11 +172,11 @@ impl Geometry {
     }
 
     /// The whole of a 16x16 atlas.
-    fn whole_quad(self, centre: Vec3, half: f32) -> Self {
+    pub(super) fn whole_quad(self, centre: Vec3, half: f32) -> Self {
         self.quad(centre, half, 0, [Vec2::splat(0.5), Vec2::splat(15.5)])
     }
 
-    fn frame(self, picture: YuvPicture) -> ClientFrame {
+    pub(super) fn frame(self, picture: YuvPicture) -> ClientFrame {
         ClientFrame {
             frame: FrameId(1),
             epoch: Epoch(0),
@@ -189,7 +189,7 @@ impl Geometry {
             indices: Arc::new(self.indices),
             objects_lead: 0,
             motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),
-            picture: Arc::new(picture),
+            picture: picture.into(),
             masks: None,
             patches: 1,
         }
@@ -197,7 +197,7 @@ impl Geometry {
 }
 
 impl Pixels {
-    fn at(&self, x: u32, y: u32) -> [u8; 3] {
+    pub(super) fn at(&self, x: u32, y: u32) -> [u8; 3] {
         let first = (y * self.width + x) as usize * 4;
         [self.rgba[first], self.rgba[first + 1], self.rgba[first + 2]]
     }
@@ -211,7 +211,7 @@ impl Pixels {
 }
 
 #[track_caller]
-fn assert_close(actual: [u8; 3], expected: [u8; 3], tolerance: u8) {
+pub(super) fn assert_close(actual: [u8; 3], expected: [u8; 3], tolerance: u8) {
     let far = actual
         .iter()
         .zip(expected)

@@ -6,8 +6,8 @@ use glam::{Vec2, Vec3};
 use shadecast_protocol::Pose;
 
 use super::*;
-use crate::MaskAtlas;
 use crate::render::UploadError;
+use crate::{DecodedPicture, MaskAtlas};
 
 /// BT.709 in double precision.
 fn expected(yuv: [u8; 3]) -> [u8; 3] {
@@ -153,7 +153,7 @@ fn a_frame_that_the_device_cannot_hold_is_refused_and_the_last_one_stays() {
     let mut bench = Bench::with_frame(&good);
     let with_size = |width, height, luma| {
         let mut frame = good.clone();
-        frame.picture = Arc::new(YuvPicture {
+        frame.picture = DecodedPicture::from(YuvPicture {
             width,
             height,
             y: vec![0; luma],

@@ -115,7 +115,7 @@ impl Simulation {
         self.decoded = Some(frame);
         Decoded {
             ticket: unit.ticket,
-            picture: Ok(picture_of(&unit.bytes)),
+            picture: Ok(picture_of(&unit.bytes).into()),
         }
     }
 

@@ -54,6 +54,25 @@ fn a_lost_picture_is_noticed_asked_for_and_recovered_from() {
     assert_eq!(presented(&client.frame(server.frame())), [5]);
 }
 
+#[test]
+fn a_decoder_that_says_nothing_is_given_up_and_started_anew() {
+    let mut client = Client::welcomed();
+    let mut server = Server::default();
+    client.frame(server.frame());
+    let (update, picture) = server.frame();
+    client.message(update);
+    let outputs = client.message(picture);
+    assert!(matches!(&outputs[..], [Output::Decode(_)]));
+    assert!(reset_requests(&client.pass(1_000)).is_empty());
+    assert_eq!(reset_requests(&client.pass(20)), [ResetReason::Decoder]);
+    server.reset();
+    let (update, picture) = server.frame();
+    client.message(update);
+    let outputs = client.message(picture);
+    assert!(matches!(&outputs[..], [Output::Decode(unit)] if unit.restart));
+    assert_eq!(presented(&client.decode_all(outputs)), [2]);
+}
+
 /// Updates of frames that were given up fill the inbox, and must not be taken
 /// for ones that wait in vain.
 #[test]
