@@ -1,0 +1,8 @@
+// One triangle that covers the picture.
+// Compiled by compile.sh; the binary holds this text, and a test compares them.
+#version 450
+
+void main() {
+    vec2 corner = vec2(gl_VertexIndex & 1, gl_VertexIndex >> 1) * 4.0 - 1.0;
+    gl_Position = vec4(corner, 0.0, 1.0);
+}
