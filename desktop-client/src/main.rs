@@ -8,7 +8,7 @@ mod clock;
 mod drawing;
 mod headless;
 mod headset;
-mod network;
+mod interrupt;
 #[cfg(feature = "window")]
 mod pilot;
 mod report;

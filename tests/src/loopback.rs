@@ -321,6 +321,7 @@ impl Loopback {
                 fov: Fov::symmetric(1.5),
             }),
             eye_resolution: [EYE_SIDE; 2],
+            hands: [None; 2],
         }
     }
 }
