@@ -14,6 +14,8 @@ pub mod openxr;
 #[cfg(feature = "render")]
 pub mod render;
 mod session;
+#[cfg(feature = "network")]
+pub mod settings;
 mod steady;
 mod world;
 

@@ -62,8 +62,16 @@ pub use ::openxr as api;
 /// # Errors
 /// When there is none.
 pub fn load() -> Result<xr::Entry, HeadsetError> {
+    load_for(&())
+}
+
+/// The loader of a platform that has to tell it something.
+///
+/// # Errors
+/// When there is none, or it refuses.
+pub fn load_for(platform: &impl xr::PlatformInfo) -> Result<xr::Entry, HeadsetError> {
     // SAFETY: the loader of the system is what it says.
-    let entry = unsafe { xr::Entry::load(&()) };
+    let entry = unsafe { xr::Entry::load(platform) };
     entry.map_err(|error| {
         let source = std::error::Error::source(&error);
         HeadsetError::NoLoader(source.map_or(error.to_string(), ToString::to_string))

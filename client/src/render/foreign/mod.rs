@@ -30,7 +30,7 @@ use crate::ForeignPicture;
 use pass::{Pass, Pipeline};
 use ring::{RING, Ring};
 
-pub use image::{ImageParts, RawDevice, SourceImage, SourceSampler};
+pub use image::{ImageParts, PictureKind, RawDevice, SourceImage, SourceSampler};
 
 /// Makes Vulkan images of pictures of the platform.
 pub trait ImageSource: Debug + Send {
