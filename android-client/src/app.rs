@@ -11,12 +11,12 @@ use std::time::Duration;
 
 use android_activity::{AndroidApp, MainEvent, PollEvent};
 use anyhow::{Context, Result, ensure};
-use shadecast_client::network::{Event, Network};
+use shadecast_client::PlatformDecoder;
+use shadecast_client::network::Event;
 use shadecast_client::openxr::api::AndroidPlatformInfo;
-use shadecast_client::openxr::{self, Headset, HeadsetConfig, Turn};
+use shadecast_client::openxr::{self, HeadsetClient, HeadsetConfig, Turn};
+use shadecast_client::render::Renderer;
 use shadecast_client::render::vulkan::{Extras, VulkanGpu};
-use shadecast_client::render::{FrameReceiver, FrameSender, Renderer, frame_channel};
-use shadecast_client::{Clock, PlatformDecoder};
 use shadecast_protocol::ClientTime;
 
 use crate::codec::Codec;
@@ -30,7 +30,7 @@ const MAX_ATLAS_SIDE: u16 = 4096;
 /// the file sees the scene at once.
 const LOOK_AGAIN: Duration = Duration::from_secs(1);
 
-type AndroidHeadset = Headset<AndroidPlatformInfo>;
+type AndroidClient = HeadsetClient<AndroidPlatformInfo>;
 
 /// Runs until the user leaves or the activity is destroyed.
 ///
@@ -44,39 +44,30 @@ pub(crate) fn run(app: &AndroidApp) -> Result<()> {
             return Ok(());
         }
     }
-    let clock = Clock::start();
-    let (sender, frames) = frame_channel();
     // What the user in the headset is to be told of decoder and GPU.
     let (complain, complaints) = channel();
-    let mut headset = open_headset(app, frames, complain.clone())?;
+    let mut client = open_headset(app, complain.clone())?;
+    let headset = client.headset();
     if let (Some([width, height]), Some(offers)) = (headset.eye_size(), headset.offers()) {
         tracing::info!("headset: {width}x{height} pixels an eye, {offers:?}");
     }
-    let mut server = Server {
-        frames: Some(sender),
-        network: None,
-        look_at: ClientTime(0),
-        complain,
-    };
+    let mut look_at = client.clock().now();
     let mut pause = Duration::ZERO;
     loop {
         activity.hear(app, Some(pause));
         if activity.is_destroyed {
             return Ok(());
         }
-        server.reach(app, clock, &mut headset);
-        server.hear(&mut headset);
+        let now = client.clock().now();
+        if client.network().is_none() && now >= look_at {
+            look_at = ClientTime(now.0 + LOOK_AGAIN.as_nanos() as u64);
+            reach_server(app, &mut client, &complain)?;
+        }
         for complaint in complaints.try_iter() {
             tracing::error!("{complaint}");
-            headset.say(Some(complaint));
+            client.say(Some(complaint));
         }
-        let network = server.network.as_ref();
-        let turn = headset.turn(&|| clock.now(), &mut |input| {
-            if let Some(network) = network {
-                network.tell(input);
-            }
-        });
-        pause = match turn.context("the headset cannot be used")? {
+        pause = match client.turn(&mut hear)? {
             Turn::Frame(_) => Duration::ZERO,
             Turn::Idle | Turn::Lost => openxr::IDLE,
             Turn::Exit => return Ok(()),
@@ -117,11 +108,7 @@ impl Activity {
     }
 }
 
-fn open_headset(
-    app: &AndroidApp,
-    frames: FrameReceiver,
-    complain: Sender<String>,
-) -> Result<AndroidHeadset> {
+fn open_headset(app: &AndroidApp, complain: Sender<String>) -> Result<AndroidClient> {
     // SAFETY: machine and activity are valid as long as `app`, which outlives the
     // headset.
     let platform = unsafe { AndroidPlatformInfo::new(app.vm_as_ptr(), app.activity_as_ptr()) };
@@ -141,7 +128,7 @@ fn open_headset(
         })),
         ..HeadsetConfig::default()
     };
-    Headset::open(loader, platform, config, frames).context("there is no headset to draw for")
+    HeadsetClient::open(loader, platform, config).context("there is no headset to draw for")
 }
 
 /// Lets the renderer take pictures of the decoder.
@@ -155,63 +142,39 @@ fn reach_pictures(vulkan: &VulkanGpu, renderer: &mut Renderer) -> Result<()> {
     Ok(renderer.set_image_source(Box::new(images))?)
 }
 
-/// The session with the server, as soon as it is known which.
-struct Server {
-    /// None once the session has it.
-    frames: Option<FrameSender>,
-    network: Option<Network>,
-    /// When the line is looked for again.
-    look_at: ClientTime,
-    complain: Sender<String>,
+/// Starts the session with the server when there is a line to start it with.
+fn reach_server(
+    app: &AndroidApp,
+    client: &mut AndroidClient,
+    complain: &Sender<String>,
+) -> Result<()> {
+    let line = match settings::find(app) {
+        Ok(line) => line,
+        Err(error) => {
+            client.say(Some(error.to_string()));
+            return Ok(());
+        }
+    };
+    tracing::info!("server {}", line.address);
+    client.say(None);
+    let complain = complain.clone();
+    let decoder = PlatformDecoder::new(move |size| {
+        Codec::open(size).inspect_err(|error| {
+            // Nobody listens only while everything ends.
+            let _ = complain.send(error.to_string());
+        })
+    });
+    Ok(client.connect(line, decoder, MAX_ATLAS_SIDE)?)
 }
 
-impl Server {
-    /// Starts the session when there is a line to start it with.
-    fn reach(&mut self, app: &AndroidApp, clock: Clock, headset: &mut AndroidHeadset) {
-        let now = clock.now();
-        if self.frames.is_none() || now < self.look_at {
-            return;
+/// Leaves a trace of what the session has to say.
+fn hear(event: &Event) {
+    match event {
+        Event::Welcomed(welcome) => {
+            let [width, height] = welcome.atlas_size;
+            tracing::info!("welcomed: an atlas of {width}x{height} texels");
         }
-        self.look_at = ClientTime(now.0 + LOOK_AGAIN.as_nanos() as u64);
-        let line = match settings::find(app) {
-            Ok(line) => line,
-            Err(error) => return headset.say(Some(error.to_string())),
-        };
-        let Some(frames) = self.frames.take() else {
-            return;
-        };
-        tracing::info!("server {}", line.address);
-        headset.say(None);
-        let complain = self.complain.clone();
-        let decoder = PlatformDecoder::new(move |size| {
-            Codec::open(size).inspect_err(|error| {
-                // Nobody listens only while everything ends.
-                let _ = complain.send(error.to_string());
-            })
-        });
-        self.network = Network::start(line, MAX_ATLAS_SIDE, clock, decoder, frames)
-            .inspect_err(|error| headset.say(Some(format!("No network: {error}"))))
-            .ok();
-    }
-
-    /// Passes on what the session has to say.
-    fn hear(&mut self, headset: &mut AndroidHeadset) {
-        for event in self.network.iter().flat_map(|one| one.events.try_iter()) {
-            match event {
-                Event::Welcomed(welcome) => {
-                    let [width, height] = welcome.atlas_size;
-                    tracing::info!("welcomed: an atlas of {width}x{height} texels");
-                    headset.welcome(&welcome);
-                }
-                Event::Status(status) => {
-                    tracing::info!("{status:?}");
-                    headset.take_status(&status);
-                }
-                Event::Failed(failure) => {
-                    tracing::error!("the session is over: {failure}");
-                    headset.say(Some(failure.to_string()));
-                }
-            }
-        }
+        Event::Status(status) => tracing::info!("{status:?}"),
+        Event::Failed(failure) => tracing::error!("the session is over: {failure}"),
     }
 }

@@ -37,7 +37,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut headset = Headset::start(args, clock, drawing)?;
 
     let began = clock.now();
-    let mut display = DisplayClock::new(began, args.display_rate);
+    let mut display = DisplayClock::new(began, args.display_rate());
     let mut missed_before = 0;
     loop {
         clock.sleep_until(display.next_tick());

@@ -14,7 +14,7 @@ use crate::interrupt::Interrupt;
 use crate::status::StatusLine;
 
 /// Largest atlas that the software decoder is trusted with, texels a side.
-const MAX_ATLAS_SIDE: u32 = 4096;
+pub(crate) const MAX_ATLAS_SIDE: u32 = 4096;
 
 /// The client of one run, whatever its display is.
 #[derive(Debug)]

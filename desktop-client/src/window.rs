@@ -155,7 +155,7 @@ impl Open {
             surface,
             config,
             window,
-            display: DisplayClock::new(clock.now(), args.display_rate),
+            display: DisplayClock::new(clock.now(), args.display_rate()),
             pilot: Pilot::new(),
             holds_mouse: false,
             last: clock.now(),

@@ -33,6 +33,8 @@
 //! # }
 //! ```
 
+#[cfg(feature = "network")]
+mod client;
 mod error;
 mod hands;
 mod headset;
@@ -48,6 +50,8 @@ mod walk;
 
 use ::openxr as xr;
 
+#[cfg(feature = "network")]
+pub use client::{ClientError, HeadsetClient};
 pub use error::HeadsetError;
 pub use headset::{Frame, Headset, HeadsetConfig, IDLE, OnDevice, Turn};
 pub use lifecycle::{Ending, LifeCycle, Step};
@@ -71,9 +75,25 @@ pub fn load() -> Result<xr::Entry, HeadsetError> {
 /// When there is none, or it refuses.
 pub fn load_for(platform: &impl xr::PlatformInfo) -> Result<xr::Entry, HeadsetError> {
     // SAFETY: the loader of the system is what it says.
-    let entry = unsafe { xr::Entry::load(platform) };
-    entry.map_err(|error| {
-        let source = std::error::Error::source(&error);
-        HeadsetError::NoLoader(source.map_or(error.to_string(), ToString::to_string))
-    })
+    unsafe { xr::Entry::load(platform) }.map_err(|error| no_loader(&error))
+}
+
+fn no_loader(error: &xr::EntryError) -> HeadsetError {
+    let source = std::error::Error::source(error);
+    HeadsetError::NoLoader(source.map_or(error.to_string(), ToString::to_string))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_missing_loader_is_named_and_how_to_get_one() {
+        let nowhere = std::path::Path::new("/nowhere/libopenxr_loader.so.1");
+        // SAFETY: there is no such library.
+        let error = unsafe { xr::Entry::load_from(nowhere, &()) }.err();
+        let said = no_loader(&error.expect("there is no such library")).to_string();
+        assert!(said.contains("install libopenxr-loader1"), "{said}");
+        assert!(said.contains("/nowhere"), "{said}");
+    }
 }

@@ -1,0 +1,8 @@
+//! The headset client against a simulated runtime.
+
+mod faults;
+mod hands;
+mod live;
+mod refusals;
+mod rig;
+mod stall;
