@@ -170,6 +170,10 @@ pub struct Picture {
 }
 
 /// What a client says.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "the large one is nearly all that is said"
+)]
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum ToServer {
     /// First message of a session.

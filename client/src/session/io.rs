@@ -67,6 +67,10 @@ pub enum Disconnection {
 }
 
 /// What is to be done.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "the large ones are nearly all that is to be done"
+)]
 #[derive(Clone, Debug)]
 pub enum Output {
     /// Make a connection; any earlier one is gone.
