@@ -59,7 +59,7 @@ val buildClient by tasks.registering(Exec::class) {
     // Pages of 16 KiB, which newer devices have.
     environment("CARGO_TARGET_AARCH64_LINUX_ANDROID_RUSTFLAGS", "-Clink-arg=-Wl,-zmax-page-size=16384")
     commandLine(
-        "cargo", "ndk", "-t", "arm64-v8a", "-P", libs.versions.minSdk.get(),
+        "cargo", "ndk", "-t", "arm64-v8a", "--platform", libs.versions.minSdk.get(),
         "-o", cargoLibraries.get().asFile.path,
         "build", "--release", "--locked", "-p", "shadecast-android",
     )

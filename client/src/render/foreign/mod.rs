@@ -11,9 +11,12 @@
 //! wait for the drawing that still reads the one before. A picture goes back to
 //! its decoder when the GPU is done with it.
 
+mod device;
 mod image;
 mod pass;
+mod pipeline;
 mod ring;
+mod sampler;
 #[cfg(test)]
 mod tests;
 
@@ -27,10 +30,13 @@ use ash::vk;
 use thiserror::Error;
 
 use crate::ForeignPicture;
-use pass::{Pass, Pipeline};
+use pass::Pass;
+use pipeline::Pipeline;
 use ring::{RING, Ring};
 
-pub use image::{ImageParts, PictureKind, RawDevice, SourceImage, SourceSampler};
+pub use device::RawDevice;
+pub use image::{ImageParts, SourceImage};
+pub use sampler::{PictureKind, SourceSampler};
 
 /// Makes Vulkan images of pictures of the platform.
 pub trait ImageSource: Debug + Send {
