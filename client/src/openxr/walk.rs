@@ -13,8 +13,7 @@ const DEAD_ZONE: f32 = 0.15;
 /// head looks, level with the floor.
 pub(super) fn velocity(world_from_head: Pose, stick: Vec2) -> Vec3 {
     let length = stick.length();
-    // False for NaN.
-    if !(length > DEAD_ZONE) {
+    if length.is_nan() || length <= DEAD_ZONE {
         return Vec3::ZERO;
     }
     let ahead = world_from_head.orientation * Vec3::NEG_Z;

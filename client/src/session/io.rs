@@ -68,6 +68,10 @@ pub enum Disconnection {
 
 /// What is to be done.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "an output is done at once; only a few ever wait"
+)]
 pub enum Output {
     /// Make a connection; any earlier one is gone.
     Connect,
