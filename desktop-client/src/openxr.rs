@@ -184,6 +184,8 @@ mod tests {
                 began: ClientTime(0),
                 display_at: ClientTime(at * 1_000_000),
                 period,
+                uploading: Duration::ZERO,
+                drawing: Duration::ZERO,
                 drawn: number > 0,
                 fresh: false,
             };

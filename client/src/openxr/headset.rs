@@ -67,6 +67,11 @@ pub struct Frame {
     pub display_at: ClientTime,
     /// Between two frames of the display.
     pub period: Duration,
+    /// How long it took to hand a new world to the GPU.
+    pub uploading: Duration,
+    /// How long it took to record and submit what is drawn: the driver's time for
+    /// the most part.
+    pub drawing: Duration,
     /// Whether something was drawn and submitted.
     pub drawn: bool,
     /// Whether a frame of the server was shown for the first time.

@@ -207,12 +207,14 @@ impl RuntimeSession {
             began,
             display_at: display_at(began, runtime_now, time, period),
             period: Duration::from_nanos(period.as_nanos().max(0) as u64),
+            uploading: Duration::ZERO,
+            drawing: Duration::ZERO,
             drawn: false,
             fresh: false,
         };
         self.stream.begin().map_err(refused("begins no frame"))?;
         let drawn = if state.should_render {
-            self.draw(held, time, &mut frame, tell)
+            self.draw(held, time, &mut frame, now, tell)
         } else {
             Ok(None)
         };
@@ -278,9 +280,10 @@ impl RuntimeSession {
         held: &mut Held,
         time: xr::Time,
         frame: &mut Frame,
+        now: &dyn Fn() -> ClientTime,
         tell: &mut dyn FnMut(Input),
     ) -> Result<Option<[EyeLocation; 2]>, HeadsetError> {
-        frame.fresh = self.bring_up_to_date(held, frame.began);
+        self.bring_up_to_date(held, frame, now);
         let stick = if self.life.is_focused() {
             self.hands.sync(&self.session)?;
             self.hands.stick(&self.session)
@@ -304,6 +307,7 @@ impl RuntimeSession {
                 .as_ref()
                 .map_or(0.0, |shown| shown.seconds_of_motion(frame.display_at));
             self.renderer.place_notice(cameras);
+            let began = now();
             submit(
                 &self.vulkan.gpu,
                 &self.renderer,
@@ -312,6 +316,7 @@ impl RuntimeSession {
                 target,
                 depth,
             );
+            frame.drawing = since(began, now());
             frame.drawn = true;
         }
         self.color.release()?;
@@ -325,27 +330,32 @@ impl RuntimeSession {
     }
 
     /// Gives the renderer what has come since the last frame; all of what is
-    /// held, if the session is new. True when a frame is shown for the first time.
-    fn bring_up_to_date(&mut self, held: &mut Held, now: ClientTime) -> bool {
-        let mut fresh = false;
-        let newest = held.take_newest(now);
+    /// held, if the session is new.
+    fn bring_up_to_date(
+        &mut self,
+        held: &mut Held,
+        frame: &mut Frame,
+        now: &dyn Fn() -> ClientTime,
+    ) {
+        let newest = held.take_newest(frame.began);
         let has_newest = newest.is_some();
         let lacking = || held.shown.clone().filter(|_| !self.is_current);
-        if let Some(frame) = newest.or_else(lacking) {
-            match self.renderer.upload(&frame) {
+        if let Some(world) = newest.or_else(lacking) {
+            let began = now();
+            match self.renderer.upload(&world) {
                 Ok(()) => {
-                    held.shown = Some(frame);
-                    fresh = has_newest;
+                    held.shown = Some(world);
+                    frame.fresh = has_newest;
                 }
                 Err(error) => tracing::warn!("a frame is not shown: {error}"),
             }
+            frame.uploading = since(began, now());
         }
         if std::mem::take(&mut held.sky_is_new) || !self.is_current {
             self.renderer.set_sky(held.sky.as_ref());
         }
         self.is_current = true;
-        self.renderer.set_notice(held.notice(now));
-        fresh
+        self.renderer.set_notice(held.notice(frame.began));
     }
 
     /// Tells the server where the head and the hands are, and moves the play
@@ -555,6 +565,10 @@ fn ask_for_rate(session: &xr::Session<xr::Vulkan>, wanted: f32) {
     if let Err(error) = asked {
         tracing::warn!("the display keeps its rate: {error}");
     }
+}
+
+fn since(began: ClientTime, now: ClientTime) -> Duration {
+    Duration::from_nanos(now.0.saturating_sub(began.0))
 }
 
 fn submit(

@@ -67,11 +67,11 @@ pub enum Disconnection {
 }
 
 /// What is to be done.
-#[allow(
-    clippy::large_enum_variant,
-    reason = "the large ones are nearly all that is to be done"
-)]
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "an output is done at once; only a few ever wait"
+)]
 pub enum Output {
     /// Make a connection; any earlier one is gone.
     Connect,

@@ -3,6 +3,7 @@
 mod faults;
 mod hands;
 mod live;
+mod misuse;
 mod refusals;
 mod rig;
 mod stall;
