@@ -1,6 +1,6 @@
 //! The whole path from the head to the display, in virtual time.
 
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 use shadecast_client::{
     AccessUnit, ClientTiming, DecodedPicture, Decoder, OpenH264Decoder, Ticket, World,

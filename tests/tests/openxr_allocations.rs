@@ -12,7 +12,7 @@ use glam::Vec3;
 use shadecast_client::openxr::{Headset, HeadsetConfig, Turn, api};
 use shadecast_client::render::vulkan::{DirectHost, Extras, VulkanGpu};
 use shadecast_client::render::{EyeCamera, EyeImages, Renderer, RendererConfig, frame_channel};
-use shadecast_client::{ClientFrame, ClientTiming, DrawVertex, YuvPicture};
+use shadecast_client::{ClientFrame, ClientTiming, DecodedPicture, DrawVertex, YuvPicture};
 use shadecast_protocol::{
     ClientTime, Codec, Epoch, Fov, FrameId, Motion, Pose, Sky, UpdateTiming, Welcome,
 };
@@ -101,7 +101,7 @@ fn frame() -> ClientFrame {
         opaque_indices: 3,
         objects_lead: 0,
         motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),
-        picture: Arc::new(YuvPicture {
+        picture: DecodedPicture::from(YuvPicture {
             width: 16,
             height: 16,
             y: vec![63; 256],

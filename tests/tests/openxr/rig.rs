@@ -8,7 +8,9 @@ use shadecast_client::render::{
     EyeCamera, EyeImages, FrameSender, Gpu, Pixels, Readback, Renderer, RendererConfig,
     frame_channel,
 };
-use shadecast_client::{ClientFrame, ClientTiming, DrawVertex, HeadView, Input, YuvPicture};
+use shadecast_client::{
+    ClientFrame, ClientTiming, DecodedPicture, DrawVertex, HeadView, Input, YuvPicture,
+};
 use shadecast_protocol::{
     ClientTime, Epoch, Fov, FrameId, Motion, Pose, Sky, UpdateTiming, Welcome,
 };
@@ -150,7 +152,7 @@ pub(crate) fn wall() -> Arc<ClientFrame> {
         objects_lead: 0,
         motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),
         // Red in limited-range BT.709.
-        picture: Arc::new(YuvPicture {
+        picture: DecodedPicture::from(YuvPicture {
             width: 16,
             height: 16,
             y: vec![63; 256],
