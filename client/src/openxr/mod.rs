@@ -71,8 +71,12 @@ pub fn load() -> Result<xr::Entry, HeadsetError> {
 }
 
 fn no_loader(error: &xr::EntryError) -> HeadsetError {
-    let source = std::error::Error::source(error);
-    HeadsetError::NoLoader(source.map_or(error.to_string(), ToString::to_string))
+    // The last cause is what the system says.
+    let mut cause: &dyn std::error::Error = error;
+    while let Some(deeper) = cause.source() {
+        cause = deeper;
+    }
+    HeadsetError::NoLoader(cause.to_string())
 }
 
 #[cfg(test)]

@@ -297,6 +297,7 @@ impl RuntimeSession {
         };
         let eyes = locate_eyes(&self.session, time, &self.base)
             .map_err(refused("does not tell where the eyes are"))?;
+        let mut submitted_at = frame.began;
         if let Some(eyes) = &eyes {
             let cameras = eyes.each_ref().map(|eye| EyeCamera {
                 world_from_eye: held.world_from_play.then(eye.base_from_eye),
@@ -316,7 +317,8 @@ impl RuntimeSession {
                 target,
                 depth,
             );
-            frame.drawing = since(began, now());
+            submitted_at = now();
+            frame.drawing = since(began, submitted_at);
             frame.drawn = true;
         }
         self.color.release()?;
@@ -324,7 +326,7 @@ impl RuntimeSession {
             depth.release()?;
         }
         if let Some(eyes) = &eyes {
-            self.report(held, eyes, stick, time, frame, tell)?;
+            self.report(held, eyes, stick, time, (frame, submitted_at), tell)?;
         }
         Ok(eyes)
     }
@@ -366,7 +368,7 @@ impl RuntimeSession {
         eyes: &[EyeLocation; 2],
         stick: Vec2,
         time: xr::Time,
-        frame: &Frame,
+        (frame, now): (&Frame, ClientTime),
         tell: &mut dyn FnMut(Input),
     ) -> Result<(), HeadsetError> {
         let (location, velocity) = self
@@ -395,8 +397,10 @@ impl RuntimeSession {
             [None; 2]
         };
         tell(Input::View(HeadView {
-            sampled_at: frame.began,
-            display_at: frame.display_at,
+            // Of the head, here and now, and not when the runtime woke us: the
+            // server measures the network by it.
+            sampled_at: now,
+            display_at: frame.display_at.max(now),
             world_from_head,
             linear_velocity: world_from_base.orientation * linear + walks,
             angular_velocity: world_from_base.orientation * angular,

@@ -52,6 +52,31 @@ fn what_is_not_seen_is_not_drawn_but_paced() {
 
 #[test]
 #[ignore = "needs a Vulkan driver"]
+fn a_view_that_is_late_is_reported_for_now() {
+    let mut rig = with(&[]);
+    rig.run_to(10);
+    rig.told.clear();
+    // Every reading of the clock takes longer than a display interval.
+    let clock = std::cell::Cell::new(rig.runtime.now() as u64);
+    let slow = || {
+        clock.set(clock.get() + 30_000_000);
+        shadecast_protocol::ClientTime(clock.get())
+    };
+    let mut views = Vec::new();
+    let turn = rig.headset.turn(&slow, &mut |input| views.push(input));
+    assert!(turn.is_ok());
+    let [shadecast_client::Input::View(view)] = views[..] else {
+        panic!("{views:?}");
+    };
+    assert!(
+        view.sampled_at <= view.display_at,
+        "the server would refuse it"
+    );
+    assert_eq!(view.sampled_at.0, clock.get(), "sampled after drawing");
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
 fn skipped_intervals_and_another_rate_move_the_times_of_frames() {
     let mut rig = with(&[(10, Fault::Skip(3)), (20, Fault::Rate(120.0))]);
     rig.run_to(30);
