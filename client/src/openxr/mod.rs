@@ -66,8 +66,16 @@ pub use ::openxr as api;
 /// # Errors
 /// When there is none.
 pub fn load() -> Result<xr::Entry, HeadsetError> {
+    load_for(&())
+}
+
+/// The loader of a platform that has to tell it something.
+///
+/// # Errors
+/// When there is none, or it refuses.
+pub fn load_for(platform: &impl xr::PlatformInfo) -> Result<xr::Entry, HeadsetError> {
     // SAFETY: the loader of the system is what it says.
-    unsafe { xr::Entry::load(&()) }.map_err(|error| no_loader(&error))
+    unsafe { xr::Entry::load(platform) }.map_err(|error| no_loader(&error))
 }
 
 fn no_loader(error: &xr::EntryError) -> HeadsetError {

@@ -52,7 +52,7 @@ impl RuntimeSession {
             instance: &instance,
             system,
         };
-        let vulkan = VulkanGpu::open(&mut host, &config.extras)?;
+        let vulkan = VulkanGpu::open_with(&mut host, &config.extras, config.stereo)?;
         let binding = xr::vulkan::SessionCreateInfo {
             instance: vulkan.instance.as_raw() as _,
             physical_device: vulkan.physical.as_raw() as _,
