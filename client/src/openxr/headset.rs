@@ -9,7 +9,7 @@ use super::held::Held;
 use super::session::{RuntimeSession, SessionTurn};
 use super::{Ending, HeadsetError, LifeCycle, Offers};
 use crate::render::vulkan::{Extras, VulkanGpu};
-use crate::render::{FrameReceiver, Renderer};
+use crate::render::{FrameReceiver, Renderer, Stereo};
 use crate::{Input, Status};
 
 /// How long whoever runs a headset sleeps after a turn that drew nothing.
@@ -28,6 +28,8 @@ pub struct HeadsetConfig {
     pub antialias: bool,
     /// Pictures a second to ask for, where the display has a choice.
     pub display_rate: Option<f32>,
+    /// How both eyes are drawn; without, in what the device does rightly.
+    pub stereo: Option<Stereo>,
     /// What the device should be able to do besides drawing.
     pub extras: Extras,
     /// For what else is done on the device.
@@ -39,6 +41,7 @@ impl Default for HeadsetConfig {
         Self {
             antialias: true,
             display_rate: None,
+            stereo: None,
             extras: Extras::default(),
             on_device: None,
         }

@@ -79,8 +79,12 @@ pub fn load_for(platform: &impl xr::PlatformInfo) -> Result<xr::Entry, HeadsetEr
 }
 
 fn no_loader(error: &xr::EntryError) -> HeadsetError {
-    let source = std::error::Error::source(error);
-    HeadsetError::NoLoader(source.map_or(error.to_string(), ToString::to_string))
+    // The last cause is what the system says.
+    let mut cause: &dyn std::error::Error = error;
+    while let Some(deeper) = cause.source() {
+        cause = deeper;
+    }
+    HeadsetError::NoLoader(cause.to_string())
 }
 
 #[cfg(test)]

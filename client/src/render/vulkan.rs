@@ -124,6 +124,19 @@ impl VulkanGpu {
     /// # Errors
     /// When there is no Vulkan, no device, or one that cannot draw for two eyes.
     pub fn open(host: &mut impl VkHost, extras: &Extras) -> Result<Self, VulkanError> {
+        Self::open_with(host, extras, None)
+    }
+
+    /// As [`open`](Self::open), to draw in this mode; without one, in what the
+    /// device does rightly.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open); when the device cannot draw in this mode.
+    pub fn open_with(
+        host: &mut impl VkHost,
+        extras: &Extras,
+        stereo: Option<Stereo>,
+    ) -> Result<Self, VulkanError> {
         // SAFETY: the Vulkan loader of the system is what it says.
         let entry = unsafe { ash::Entry::load() }?;
         let flags = wgpu::InstanceFlags::empty();
@@ -132,14 +145,16 @@ impl VulkanGpu {
         let exposed = instance
             .expose_adapter(physical)
             .ok_or(VulkanError::Lacks("what drawing needs at the least"))?;
-        let stereo = Stereo::of_device(
-            exposed.features,
-            &exposed.capabilities.limits,
-            exposed.info.device_type,
-        );
+        let stereo = stereo.unwrap_or_else(|| {
+            Stereo::of_device(
+                exposed.features,
+                &exposed.capabilities.limits,
+                exposed.info.device_type,
+            )
+        });
         let demands = demands(stereo, &exposed.capabilities.limits);
         if !exposed.features.contains(demands.required_features) {
-            return Err(VulkanError::Lacks("push constants"));
+            return Err(VulkanError::Lacks("push constants or multiview"));
         }
         let adapter = &exposed.adapter;
         let mut names = adapter.required_device_extensions(demands.required_features);

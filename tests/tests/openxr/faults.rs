@@ -1,10 +1,11 @@
 //! What goes wrong in a headset, and the state in which each thing ends.
 
+use shadecast_client::Input;
 use shadecast_client::openxr::{HeadsetConfig, Turn, api::SessionState as S};
 use shadecast_simulated_runtime::sys::{Posef, Quaternionf, Result as R, Vector3f};
 use shadecast_simulated_runtime::{Fault, Log, Script};
 
-use crate::rig::{Rig, pixel, pose_of, small_eyes, welcome};
+use crate::rig::{Rig, pixel, pose_of, small_eyes, wall, welcome};
 
 /// Frames from the first on in which nothing is to be drawn yet.
 const STARTING: u64 = 2;
@@ -48,6 +49,31 @@ fn what_is_not_seen_is_not_drawn_but_paced() {
     assert!(log.frames[32].layers.len() == 1);
     // Views are reported where they are known.
     assert_eq!(rig.views().len() as u64, 40 - expected.len() as u64);
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_view_that_is_late_is_reported_for_now() {
+    let mut rig = with(&[]);
+    rig.run_to(10);
+    rig.told.clear();
+    // Every reading of the clock takes longer than a display interval.
+    let clock = std::cell::Cell::new(rig.runtime.now() as u64);
+    let slow = || {
+        clock.set(clock.get() + 30_000_000);
+        shadecast_protocol::ClientTime(clock.get())
+    };
+    let mut views = Vec::new();
+    let turn = rig.headset.turn(&slow, &mut |input| views.push(input));
+    assert!(turn.is_ok());
+    let [Input::View(view)] = views[..] else {
+        panic!("{views:?}");
+    };
+    assert!(
+        view.sampled_at <= view.display_at,
+        "the server would refuse it"
+    );
+    assert_eq!(view.sampled_at.0, clock.get(), "sampled after drawing");
 }
 
 #[test]
@@ -145,6 +171,31 @@ fn an_instance_that_vanishes_within_a_frame_is_a_loss_as_well() {
             .last()
             .map(|frame| frame.layers.len()),
         Some(1)
+    );
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_world_that_does_not_fit_the_device_is_not_shown_and_the_one_before_stays() {
+    let mut rig = Rig::at_the_wall(Script {
+        keep: vec![10, 20],
+        ..Script::default()
+    });
+    rig.run_to(15);
+    let mut broken = (*wall()).clone();
+    let picture = std::sync::Arc::make_mut(&mut broken.picture);
+    picture.y.pop();
+    rig.sender.send(broken.into());
+    rig.run_to(22);
+    let log = rig.runtime.log();
+    assert_eq!(log.broken_rules(), []);
+    let middle = |index: usize| pixel(&log.images[index].1[0], 24, 24);
+    assert_eq!(middle(0), middle(1));
+    let drawn = |input: &&Input| matches!(input, Input::Drawn(_));
+    assert_eq!(
+        rig.told.iter().filter(drawn).count(),
+        1,
+        "only the first was shown"
     );
 }
 

@@ -4,6 +4,7 @@ mod faults;
 mod hands;
 mod live;
 mod misuse;
+mod multiview;
 mod refusals;
 mod rig;
 mod stall;

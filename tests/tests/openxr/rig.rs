@@ -133,7 +133,13 @@ pub(crate) fn welcome() -> Welcome {
 
 /// A red wall two metres ahead, wider and higher than what is seen.
 pub(crate) fn wall() -> Arc<ClientFrame> {
-    let corners = [(-9.0, -9.0), (9.0, -9.0), (9.0, 9.0), (-9.0, 9.0)];
+    red_square(9.0)
+}
+
+/// A square two metres ahead, reaching so far from where a standing head looks.
+pub(crate) fn red_square(half: f32) -> Arc<ClientFrame> {
+    let (low, high) = (1.6 - half, 1.6 + half);
+    let corners = [(-half, low), (half, low), (half, high), (-half, high)];
     let vertices = corners.map(|(x, y)| DrawVertex {
         position: [x, y, -2.0],
         object: 0,
