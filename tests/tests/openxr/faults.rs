@@ -183,8 +183,9 @@ fn a_world_that_does_not_fit_the_device_is_not_shown_and_the_one_before_stays() 
     });
     rig.run_to(15);
     let mut broken = (*wall()).clone();
-    let picture = std::sync::Arc::make_mut(&mut broken.picture);
+    let mut picture = broken.picture.planes().expect("in memory").clone();
     picture.y.pop();
+    broken.picture = picture.into();
     rig.sender.send(broken.into());
     rig.run_to(22);
     let log = rig.runtime.log();
