@@ -16,7 +16,7 @@ use crate::{
     light::{Job, Lasting, Light, Repeats, Schedule, Viewer},
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
-    scene::{Material, Scene},
+    scene::{Material, Scene, SceneFacts},
     visibility::{Prediction, Visibility, VisiblePatch, eye_of},
 };
 
@@ -117,6 +117,7 @@ pub struct Pipeline {
     encoder: Box<dyn VideoEncoder>,
     known: Known,
     exposure: f32,
+    has_sun: bool,
 }
 
 impl Pipeline {
@@ -143,6 +144,7 @@ impl Pipeline {
             .map(|patch| lasting(&scene.scene, patch))
             .collect();
         Ok(Self {
+            has_sun: SceneFacts::of(&scene.scene).suns > 0,
             known: Known::nothing(&scene),
             schedule: Schedule::new(lasting),
             gpu,
@@ -244,19 +246,24 @@ impl Pipeline {
         });
         let jobs = self
             .schedule
-            .choose(&self.scene.patches, lit, order.paths, &eyes);
+            .choose(&self.scene.patches, lit.clone(), order.paths, &eyes);
         let mut encoder = self
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.light.record_moves(&self.gpu, &mut encoder, &placed)?;
         self.gpu.queue.submit([encoder.finish()]);
-        let moved: Vec<Job> = (placed.placements.iter())
+        let mut unlit: Vec<Job> = (placed.placements.iter())
             .map(|placed| {
                 self.schedule
                     .job(&self.scene.patches, placed.patch, placed.block, &eyes)
             })
             .collect();
+        self.schedule.shown(&unlit);
+        if self.has_sun {
+            unlit.extend(self.schedule.stale(&self.scene.patches, lit, &eyes));
+            self.schedule.shown(&unlit);
+        }
         let viewer = Viewer {
             eye,
             pixels_per_radian,
@@ -264,7 +271,7 @@ impl Pipeline {
         };
         let noise = self
             .light
-            .trace(&self.gpu, &self.gpu_scene, &jobs, &moved, viewer)?;
+            .trace(&self.gpu, &self.gpu_scene, &jobs, &unlit, viewer)?;
         self.schedule.traced(&jobs, &noise);
         stages.light = lap();
 
@@ -337,6 +344,9 @@ impl Pipeline {
     }
 }
 
+/// Share of the light that the glossy lobe of a dielectric carries.
+const LEAST_SHINE: f32 = 0.1;
+
 /// What a patch's material and place say about how long its light stays true.
 fn lasting(scene: &Scene, patch: &Patch) -> Lasting {
     let triangle = &scene.triangles[patch.first_triangle as usize];
@@ -352,5 +362,6 @@ fn lasting(scene: &Scene, patch: &Patch) -> Lasting {
         },
         point: scene.positions[triangle.positions[0] as usize],
         alpha: roughness * roughness,
+        shine: material.metallic.max(LEAST_SHINE),
     }
 }

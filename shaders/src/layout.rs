@@ -176,6 +176,7 @@ fn layouts_match() {
     assert_eq!(u64::from(members(&atlas, "PathState").0), STATE_BYTES);
     assert_eq!(u64::from(members(&atlas, "Ray").0) * 3, RAY_BYTES);
     assert_eq!(u64::from(members(&atlas, "Cell").0), CELL_BYTES);
+    assert_eq!(u64::from(members(&atlas, "Judgement").0), JUDGEMENT_BYTES);
     let still = module("still", STILL_SOURCE);
     same_layout!(
         &still,
