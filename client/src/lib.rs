@@ -1,14 +1,20 @@
 //! Everything a shadecast client does on every platform: the sans-IO session
-//! that pairs pictures with updates, and behind features the decoder and the
-//! renderer.
+//! that pairs pictures with updates, and behind features the decoder, the
+//! renderer, the thread that talks to the server and the frame loop of a
+//! headset.
 
 mod clock;
 mod decode;
 mod frame;
 mod latency;
+#[cfg(feature = "network")]
+pub mod network;
+#[cfg(all(feature = "openxr", not(target_vendor = "apple")))]
+pub mod openxr;
 #[cfg(feature = "render")]
 pub mod render;
 mod session;
+mod steady;
 mod world;
 
 pub use clock::ClockEstimate;
@@ -20,4 +26,5 @@ pub use latency::{Drawn, Latency, LatencySummary};
 pub use session::{
     Disconnection, Failure, HeadView, Input, Output, Session, SessionConfig, Status,
 };
+pub use steady::Clock;
 pub use world::{World, WorldError};

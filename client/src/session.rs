@@ -233,6 +233,7 @@ impl Session {
             angular_velocity: view.angular_velocity,
             eyes: view.eyes,
             eye_resolution: view.eye_resolution,
+            hands: view.hands,
         };
         self.outputs.push_back(Output::Send(ToServer::View(report)));
     }

@@ -13,7 +13,7 @@ use crate::trace::{HeadTrace, Sway};
 use crate::trace_file::TraceFile;
 
 /// A mock headset for shadecast: draws the streamed scene in stereo at its own
-/// pose and rate, without a display or in a window.
+/// pose and rate, without a display or in a window; or in a real headset.
 ///
 /// The head follows a built-in motion or a trace. The display ticks on its own
 /// clock whether or not anything new came; when the server vanishes, the last
@@ -34,9 +34,10 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
 
-    /// Pictures a second of the display
-    #[arg(long, value_name = "HZ", default_value_t = 30.0, value_parser = within(1.0, 1000.0))]
-    pub(crate) display_rate: f64,
+    /// Pictures a second of the display; of a headset, the nearest that it has
+    /// [default: 30; a headset's own]
+    #[arg(long, value_name = "HZ", value_parser = within(1.0, 1000.0))]
+    display_rate: Option<f64>,
 
     /// Width and height of one eye's picture, pixels
     #[arg(long, value_name = "PIXELS", default_value_t = 256, value_parser = clap::value_parser!(u16).range(16..=4096))]
@@ -75,6 +76,12 @@ pub(crate) struct Args {
     #[cfg(feature = "window")]
     #[arg(long, conflicts_with_all = ["trace", "seed", "out"])]
     pub(crate) window: bool,
+
+    /// Shows it in the headset of this machine's OpenXR runtime
+    #[cfg(all(feature = "openxr", not(target_vendor = "apple")))]
+    #[arg(long, conflicts_with_all = ["trace", "seed", "out", "eye_size", "fov", "ipd", "lens"])]
+    #[cfg_attr(feature = "window", arg(conflicts_with = "window"))]
+    pub(crate) openxr: bool,
 }
 
 const LENS_HELP: &str = r#"Distortion against the lenses: mild, none (the pass is skipped), or a file:
@@ -86,9 +93,21 @@ r (1 + k[0] r^2 + k[1] r^4). The centre is the left eye's; the right eye has it 
 const EXAMPLES: &str = "Examples:
   shadecast-desktop \"$LINE\" --seconds 20 --out run
   shadecast-desktop \"$LINE\" --trace walk.txt --display-rate 72 --eye-size 512
-  shadecast-desktop \"$LINE\" --window --lens none";
+  shadecast-desktop \"$LINE\" --window --lens none
+  shadecast-desktop \"$LINE\" --openxr";
 
 impl Args {
+    /// Of the mock headset's display, pictures a second.
+    pub(crate) fn display_rate(&self) -> f64 {
+        self.display_rate.unwrap_or(30.0)
+    }
+
+    /// What a headset's display is asked for.
+    #[cfg(all(feature = "openxr", not(target_vendor = "apple")))]
+    pub(crate) fn asked_display_rate(&self) -> Option<f32> {
+        self.display_rate.map(|rate| rate as f32)
+    }
+
     /// The head's path.
     pub(crate) fn head_trace(&self) -> Result<HeadTrace> {
         Ok(match &self.trace {
@@ -162,6 +181,7 @@ mod tests {
 
     #[test]
     fn defaults_are_those_of_the_demo() {
+        assert!(parse(&["--openxr"]).is_ok());
         let args = parse(&[]).unwrap();
         let [left, right] = args.eyes();
         assert!(
@@ -181,6 +201,8 @@ mod tests {
             &["--seconds", "-1"],
             &["--out", "somewhere"],
             &["--trace", "file", "--seed", "3"],
+            &["--openxr", "--window"],
+            &["--openxr", "--eye-size", "512"],
         ] {
             assert!(parse(bad).is_err(), "{bad:?}");
         }

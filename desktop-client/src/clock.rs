@@ -1,32 +1,6 @@
-//! The client's own time: monotonic, and the same for all its threads.
-
-use std::time::{Duration, Instant};
+//! When a display shows its pictures.
 
 use shadecast_protocol::ClientTime;
-
-/// Counts nanoseconds since the program began.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Clock {
-    start: Instant,
-}
-
-impl Clock {
-    pub(crate) fn start() -> Self {
-        Self {
-            start: Instant::now(),
-        }
-    }
-
-    pub(crate) fn now(self) -> ClientTime {
-        ClientTime(self.start.elapsed().as_nanos() as u64)
-    }
-
-    /// Sleeps until `time`, or not at all when it has passed.
-    pub(crate) fn sleep_until(self, time: ClientTime) {
-        let left = time.0.saturating_sub(self.now().0);
-        std::thread::sleep(Duration::from_nanos(left));
-    }
-}
 
 /// A display that shows a picture every period, whether there is a new one or not.
 #[derive(Clone, Copy, Debug)]

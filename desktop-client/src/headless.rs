@@ -2,12 +2,12 @@
 //! its trace, and a report at the end.
 
 use anyhow::{Result, bail};
-use shadecast_client::render::Gpu;
+use shadecast_client::{Clock, render::Gpu};
 use shadecast_protocol::{ClientTime, Motion};
 
 use crate::args::Args;
 use crate::capture::Capture;
-use crate::clock::{Clock, DisplayClock};
+use crate::clock::DisplayClock;
 use crate::drawing::{Drawing, Panel};
 use crate::headset::Headset;
 use crate::report::{Percentiles, Report, Sample, peak_memory_bytes};
@@ -37,7 +37,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     let mut headset = Headset::start(args, clock, drawing)?;
 
     let began = clock.now();
-    let mut display = DisplayClock::new(began, args.display_rate);
+    let mut display = DisplayClock::new(began, args.display_rate());
     let mut missed_before = 0;
     loop {
         clock.sleep_until(display.next_tick());

@@ -2,19 +2,19 @@
 
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
+use shadecast_client::network::{Event, Network};
 use shadecast_client::render::{EyeCamera, FrameReceiver, frame_channel};
-use shadecast_client::{ClientFrame, Drawn, HeadView, Input, Latency};
+use shadecast_client::{ClientFrame, Clock, Drawn, HeadView, Input, Latency, OpenH264Decoder};
 use shadecast_protocol::{ClientTime, EyeView, Motion, Pose};
 
 use crate::args::Args;
-use crate::clock::Clock;
 use crate::drawing::Drawing;
-use crate::network::{Event, Network};
+use crate::interrupt::Interrupt;
 use crate::status::StatusLine;
 
 /// Largest atlas that the software decoder is trusted with, texels a side.
-const MAX_ATLAS_SIDE: u32 = 4096;
+pub(crate) const MAX_ATLAS_SIDE: u32 = 4096;
 
 /// The client of one run, whatever its display is.
 #[derive(Debug)]
@@ -25,6 +25,7 @@ pub(crate) struct Headset {
     pub(crate) measured: Measured,
     status: StatusLine,
     frames: FrameReceiver,
+    interrupt: Interrupt,
     eyes: [EyeView; 2],
     eye_size: u16,
     world_from_play: Pose,
@@ -62,7 +63,15 @@ impl Headset {
         let device_limit = drawing.gpu().device.limits().max_texture_dimension_2d;
         let max_atlas_side = device_limit.min(MAX_ATLAS_SIDE) as u16;
         Ok(Self {
-            network: Network::start(args.line.clone(), max_atlas_side, clock, sender)?,
+            network: Network::start(
+                args.line.clone(),
+                max_atlas_side,
+                clock,
+                OpenH264Decoder::new(),
+                sender,
+            )
+            .context("cannot start the threads of network and decoder")?,
+            interrupt: Interrupt::watch()?,
             clock,
             drawing,
             measured: Measured::default(),
@@ -87,7 +96,7 @@ impl Headset {
         finish: impl FnOnce(&mut wgpu::CommandEncoder),
     ) -> Result<Turn> {
         let began = self.clock.now();
-        let interrupted = self.hear()?;
+        self.hear()?;
         let fresh = self.take_newest();
         let head = head.seen_from(self.world_from_play);
         self.network.tell(Input::View(HeadView {
@@ -98,6 +107,7 @@ impl Headset {
             angular_velocity: head.angular_velocity,
             eyes: self.eyes,
             eye_resolution: [self.eye_size; 2],
+            hands: [None; 2],
         }));
         let cameras = self.cameras(head.pose);
         let seconds_of_motion = self
@@ -110,7 +120,7 @@ impl Headset {
             display_at,
             cameras,
             frame: self.shown.clone(),
-            interrupted,
+            interrupted: self.interrupt.came(),
         })
     }
 
@@ -120,8 +130,7 @@ impl Headset {
     }
 
     /// Takes what the network's thread has to say.
-    fn hear(&mut self) -> Result<bool> {
-        let mut interrupted = false;
+    fn hear(&mut self) -> Result<()> {
         while let Ok(event) = self.network.events.try_recv() {
             match event {
                 Event::Welcomed(welcome) => {
@@ -129,11 +138,10 @@ impl Headset {
                     self.drawing.set_sky(&welcome.sky);
                 }
                 Event::Status(status) => self.status.say(&status),
-                Event::Interrupted => interrupted = true,
                 Event::Failed(failure) => return Err(failure.into()),
             }
         }
-        Ok(interrupted)
+        Ok(())
     }
 
     /// True when another frame is shown from now on.

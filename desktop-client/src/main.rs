@@ -1,4 +1,4 @@
-//! `shadecast-desktop`: the mock headset. Draws on the main thread at the
+//! `shadecast-desktop`: the mock headset, or a real one. Draws on the main thread at the
 //! display's rate, while other threads talk to the server, decode its pictures
 //! and write files.
 
@@ -8,7 +8,9 @@ mod clock;
 mod drawing;
 mod headless;
 mod headset;
-mod network;
+mod interrupt;
+#[cfg(all(feature = "openxr", not(target_vendor = "apple")))]
+mod openxr;
 #[cfg(feature = "window")]
 mod pilot;
 mod report;
@@ -45,6 +47,10 @@ fn run(args: &Args) -> anyhow::Result<()> {
     #[cfg(feature = "window")]
     if args.window {
         return window::run(args);
+    }
+    #[cfg(all(feature = "openxr", not(target_vendor = "apple")))]
+    if args.openxr {
+        return openxr::run(args);
     }
     headless::run(args)
 }

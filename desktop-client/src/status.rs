@@ -4,11 +4,10 @@ use std::io::IsTerminal;
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressStyle};
-use shadecast_client::Status;
+use shadecast_client::{Status, network::Traffic};
 use shadecast_protocol::ClientTime;
 
 use crate::headset::Measured;
-use crate::network::Traffic;
 
 /// Between two lines on a terminal.
 const LIVE: Duration = Duration::from_millis(500);

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
+use shadecast_client::Clock;
 use shadecast_client::render::{Gpu, LensPass, LensProfile, Viewport};
 use shadecast_protocol::ClientTime;
 use winit::application::ApplicationHandler;
@@ -15,7 +16,7 @@ use winit::keyboard::{KeyCode, PhysicalKey};
 use winit::window::{CursorGrabMode, Window, WindowId};
 
 use crate::args::Args;
-use crate::clock::{Clock, DisplayClock};
+use crate::clock::DisplayClock;
 use crate::drawing::Drawing;
 use crate::headset::Headset;
 use crate::pilot::Pilot;
@@ -154,7 +155,7 @@ impl Open {
             surface,
             config,
             window,
-            display: DisplayClock::new(clock.now(), args.display_rate),
+            display: DisplayClock::new(clock.now(), args.display_rate()),
             pilot: Pilot::new(),
             holds_mouse: false,
             last: clock.now(),

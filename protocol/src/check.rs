@@ -69,7 +69,9 @@ pub(crate) fn view(view: &ViewReport) -> Result<(), WireError> {
     }
     let sides = MIN_EYE_SIDE..=MAX_SIDE;
     let fits = view.eye_resolution.iter().all(|side| sides.contains(side));
-    rules.demand(fits, "eye resolution")
+    rules.demand(fits, "eye resolution")?;
+    let mut hands = view.hands.iter().flatten();
+    hands.try_for_each(|hand| rules.pose(hand.world_from_aim, "aim"))
 }
 
 pub(crate) fn clock(reply: &ClockReply) -> Result<(), WireError> {

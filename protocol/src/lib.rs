@@ -20,7 +20,7 @@ pub use block::{Block, Level, MIN_LOG2_SIDE};
 pub use error::WireError;
 pub use ids::{ClientTime, Epoch, FrameId, ObjectId, PatchId, ServerTime, VertexId, ViewSeq};
 pub use message::{
-    Acknowledgement, ClockReply, Codec, Hello, Picture, Refusal, ResetReason, Secret, Sky,
+    Acknowledgement, ClockReply, Codec, Hand, Hello, Picture, Refusal, ResetReason, Secret, Sky,
     ToClient, ToServer, ViewReport, Welcome,
 };
 pub use pose::{EyeView, Fov, Motion, Pose};

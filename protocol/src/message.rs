@@ -100,7 +100,19 @@ pub enum ResetReason {
     Gap,
 }
 
-/// Where the client's head is and will be.
+/// One controller.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Hand {
+    /// Where it is in the world of the scene; it points along -Z.
+    pub world_from_aim: Pose,
+    /// Whether its button is held down.
+    pub pressed: bool,
+    /// How often the button was pressed so far; wraps. A count, so that a report
+    /// that is lost loses no press.
+    pub presses: u16,
+}
+
+/// Where the client's head is and will be, and what its hands do.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ViewReport {
     /// Counts the reports.
@@ -119,6 +131,8 @@ pub struct ViewReport {
     pub eyes: [EyeView; 2],
     /// Pixels of one eye's picture, width and height.
     pub eye_resolution: [u16; 2],
+    /// Left and right controller; none for one that is not there.
+    pub hands: [Option<Hand>; 2],
 }
 
 /// The server's half of a clock sample, sent at once for every view report.
@@ -157,6 +171,10 @@ pub struct Picture {
 
 /// What a client says.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "views are most of what is said, and a box each would be an allocation each"
+)]
 pub enum ToServer {
     /// First message of a session.
     Hello(Hello),

@@ -92,6 +92,7 @@ fn view(world_from_head: Pose) -> ViewReport {
             fov: Fov::symmetric(1.6),
         }),
         eye_resolution: [EYE_SIDE; 2],
+        hands: [None; 2],
     }
 }
 

@@ -10,7 +10,7 @@ use shadecast_client::{
 };
 use shadecast_protocol::{
     ClientTime, ClockReply, Codec, EyeView, Fov, FrameId, Motion, Pose, Secret, ServerTime, Sky,
-    ToClient, ToServer, Welcome,
+    ToClient, ToServer, ViewReport, Welcome,
 };
 use shadecast_server::{
     Frame, Gpu, GpuScene, Integrator, Pipeline, Session as Server, SessionConfig as ServerConfig,
@@ -62,6 +62,8 @@ pub struct Loopback {
     lost: Option<FrameId>,
     sent: Vec<Vec<u8>>,
     presented: Vec<Arc<ClientFrame>>,
+    welcome: Option<Welcome>,
+    reported: Option<ViewReport>,
 }
 
 impl Loopback {
@@ -126,7 +128,14 @@ impl Loopback {
             lost: None,
             sent: Vec::new(),
             presented: Vec::new(),
+            welcome: None,
+            reported: None,
         })
+    }
+
+    /// The server makes a frame this often; before the client connects.
+    pub fn set_frame_period(&mut self, period: Duration) {
+        self.config.frame_period = period;
     }
 
     /// The network will lose the picture of `frame`.
@@ -144,11 +153,58 @@ impl Loopback {
             if self.now > Duration::from_secs(10) {
                 bail!("only {} frames after 10 s", self.presented.len());
             }
-            self.now += STEP;
-            self.step_server()?;
-            self.step_client()?;
+            self.step()?;
+            if (self.now.as_nanos()).is_multiple_of(VIEW_PERIOD.as_nanos()) {
+                let view = self.view();
+                self.tell(shadecast_client::Input::View(view))?;
+            }
         }
         Ok(())
+    }
+
+    /// Lets virtual time pass until `now`, with a client that has its own head.
+    ///
+    /// # Errors
+    /// As [`run_until_presented`](Self::run_until_presented).
+    pub fn run_until(&mut self, now: Duration) -> anyhow::Result<()> {
+        while self.now < now {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self) -> anyhow::Result<()> {
+        self.now += STEP;
+        self.step_server()?;
+        while let Some(bytes) = self.downstream.receive(self.now) {
+            self.tell(shadecast_client::Input::Message(ToClient::decode(&bytes)?))?;
+        }
+        self.tell(shadecast_client::Input::Tick)
+    }
+
+    /// What the client shows on its clock when `elapsed` has passed.
+    #[must_use]
+    pub fn client_clock(elapsed: Duration) -> ClientTime {
+        ClientTime((elapsed + CLIENT_AHEAD).as_nanos() as u64)
+    }
+
+    /// What the client was welcomed with, once.
+    pub fn take_welcome(&mut self) -> Option<Welcome> {
+        self.welcome.take()
+    }
+
+    /// What has come for the display since the last time; it is not in
+    /// [`presented`](Self::presented) any more, nor what was sent in
+    /// [`sent`](Self::sent).
+    pub fn take_presented(&mut self) -> Vec<Arc<ClientFrame>> {
+        self.sent.clear();
+        std::mem::take(&mut self.presented)
+    }
+
+    /// The newest view that the server has.
+    #[must_use]
+    pub fn reported(&self) -> Option<&ViewReport> {
+        self.reported.as_ref()
     }
 
     /// Every message that the server has sent, as bytes; with the lost one.
@@ -183,7 +239,7 @@ impl Loopback {
     }
 
     fn client_time(&self) -> ClientTime {
-        ClientTime((self.now + CLIENT_AHEAD).as_nanos() as u64)
+        Self::client_clock(self.now)
     }
 
     fn step_server(&mut self) -> anyhow::Result<()> {
@@ -196,6 +252,7 @@ impl Loopback {
         while let Some(bytes) = self.upstream.receive(self.now) {
             let message = ToServer::decode(&bytes)?;
             if let ToServer::View(view) = &message {
+                self.reported = Some(*view);
                 let reply = ClockReply {
                     client_sent: view.sampled_at,
                     server_received: now,
@@ -250,21 +307,11 @@ impl Loopback {
         Ok(())
     }
 
-    fn step_client(&mut self) -> anyhow::Result<()> {
-        use shadecast_client::Input;
-
-        while let Some(bytes) = self.downstream.receive(self.now) {
-            self.client_input(Input::Message(ToClient::decode(&bytes)?))?;
-        }
-        if (self.now.as_nanos()).is_multiple_of(VIEW_PERIOD.as_nanos()) {
-            let view = self.view();
-            self.client_input(Input::View(view))?;
-        }
-        self.client_input(Input::Tick)
-    }
-
     /// Tells the client what happened, and does what it wants done.
-    fn client_input(&mut self, input: shadecast_client::Input) -> anyhow::Result<()> {
+    ///
+    /// # Errors
+    /// When the client fails or hangs up.
+    pub fn tell(&mut self, input: shadecast_client::Input) -> anyhow::Result<()> {
         use shadecast_client::{Input, Output};
 
         let now = self.client_time();
@@ -293,7 +340,8 @@ impl Loopback {
                         inputs.push(Input::Drawn(Drawn::new(&frame, now, now)));
                         self.presented.push(frame);
                     }
-                    Output::Welcomed(_) | Output::Status(_) => {}
+                    Output::Welcomed(welcome) => self.welcome = Some(*welcome),
+                    Output::Status(_) => {}
                     Output::Disconnect(reason) => bail!("the client hung up: {reason}"),
                     Output::Failed(failure) => bail!("the client failed: {failure}"),
                 }
@@ -321,6 +369,7 @@ impl Loopback {
                 fov: Fov::symmetric(1.5),
             }),
             eye_resolution: [EYE_SIDE; 2],
+            hands: [None; 2],
         }
     }
 }

@@ -80,6 +80,7 @@ fn view(seq: u32) -> ToServer {
         angular_velocity: Vec3::Y,
         eyes: [eye, eye],
         eye_resolution: [256, 256],
+        hands: [None; 2],
     })
 }
 

@@ -5,7 +5,7 @@ use shadecast_protocol::{EyeView, Fov, Pose};
 
 /// Nearest distance that is drawn, metres: closer than eyes converge, and far
 /// enough for a head that leans against a wall.
-const NEAR: f32 = 0.02;
+pub(crate) const NEAR: f32 = 0.02;
 
 /// One eye in the world and what it sees.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -27,9 +27,22 @@ impl Stereo {
     /// Mesa's lavapipe puts triangles that are clipped into the wrong layer.
     #[must_use]
     pub fn of(adapter: &wgpu::Adapter) -> Self {
-        let can = adapter.features().contains(wgpu::Features::MULTIVIEW)
-            && adapter.limits().max_multiview_view_count >= EYES;
-        if can && adapter.get_info().device_type != wgpu::DeviceType::Cpu {
+        Self::of_device(
+            adapter.features(),
+            &adapter.limits(),
+            adapter.get_info().device_type,
+        )
+    }
+
+    /// The same of an adapter that wgpu does not hold yet.
+    pub(super) fn of_device(
+        features: wgpu::Features,
+        limits: &wgpu::Limits,
+        device_type: wgpu::DeviceType,
+    ) -> Self {
+        let can =
+            features.contains(wgpu::Features::MULTIVIEW) && limits.max_multiview_view_count >= EYES;
+        if can && device_type != wgpu::DeviceType::Cpu {
             Self::Multiview
         } else {
             Self::TwoPass
@@ -89,29 +102,35 @@ impl Gpu {
     /// # Errors
     /// When the adapter cannot give a device.
     pub fn with_stereo(adapter: wgpu::Adapter, stereo: Stereo) -> Result<Self, GpuError> {
-        let mut limits = wgpu::Limits {
-            max_immediate_size: IMMEDIATE_BYTES,
-            max_buffer_size: adapter.limits().max_buffer_size,
-            max_storage_buffer_binding_size: adapter.limits().max_storage_buffer_binding_size,
-            ..wgpu::Limits::default()
-        };
-        let mut features = wgpu::Features::IMMEDIATES;
-        if stereo == Stereo::Multiview {
-            features |= wgpu::Features::MULTIVIEW;
-            limits.max_multiview_view_count = EYES;
-        }
-        let (device, queue) =
-            pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
-                label: Some("shadecast client"),
-                required_features: features,
-                required_limits: limits,
-                ..wgpu::DeviceDescriptor::default()
-            }))?;
+        let demands = demands(stereo, &adapter.limits());
+        let (device, queue) = pollster::block_on(adapter.request_device(&demands))?;
         Ok(Self {
             adapter,
             device,
             queue,
             stereo,
         })
+    }
+}
+
+/// What the renderer asks of a device, whoever makes it. `limits` are those of
+/// the adapter.
+pub(super) fn demands(stereo: Stereo, limits: &wgpu::Limits) -> wgpu::DeviceDescriptor<'static> {
+    let mut required_limits = wgpu::Limits {
+        max_immediate_size: IMMEDIATE_BYTES,
+        max_buffer_size: limits.max_buffer_size,
+        max_storage_buffer_binding_size: limits.max_storage_buffer_binding_size,
+        ..wgpu::Limits::default()
+    };
+    let mut required_features = wgpu::Features::IMMEDIATES;
+    if stereo == Stereo::Multiview {
+        required_features |= wgpu::Features::MULTIVIEW;
+        required_limits.max_multiview_view_count = EYES;
+    }
+    wgpu::DeviceDescriptor {
+        label: Some("shadecast client"),
+        required_features,
+        required_limits,
+        ..wgpu::DeviceDescriptor::default()
     }
 }

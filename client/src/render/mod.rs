@@ -14,6 +14,8 @@ mod gpu;
 mod handover;
 mod lens;
 mod mesh;
+#[cfg(feature = "notice")]
+mod notice;
 mod pipelines;
 mod readback;
 mod renderer;
@@ -21,7 +23,11 @@ mod shrink;
 mod sky;
 #[cfg(test)]
 mod tests;
+#[cfg(all(feature = "vulkan", not(target_vendor = "apple")))]
+pub mod vulkan;
 
+#[cfg(all(feature = "openxr", not(target_vendor = "apple")))]
+pub(crate) use eyes::NEAR;
 pub use eyes::{EyeCamera, EyeImages};
 pub use gpu::{Gpu, GpuError, Stereo};
 pub use handover::{FrameReceiver, FrameSender, frame_channel};

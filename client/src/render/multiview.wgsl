@@ -14,3 +14,8 @@ fn vertex_moving(@builtin(view_index) eye: u32, corner: Corner) -> Point {
 fn vertex_sky(@builtin(view_index) eye: u32, @builtin(vertex_index) vertex: u32) -> Ray {
     return sky_corner(eye, vertex);
 }
+
+@vertex
+fn vertex_notice(@builtin(view_index) eye: u32, @builtin(vertex_index) vertex: u32) -> OnPanel {
+    return notice_corner(eye, vertex);
+}

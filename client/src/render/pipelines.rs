@@ -15,11 +15,13 @@ pub(super) const IMMEDIATE_BYTES: u32 = 128;
 pub(super) const TWO_PASS_SOURCE: &str = concat!(
     include_str!("patches.wgsl"),
     include_str!("sky.wgsl"),
+    include_str!("notice.wgsl"),
     include_str!("two_pass.wgsl")
 );
 pub(super) const MULTIVIEW_SOURCE: &str = concat!(
     include_str!("patches.wgsl"),
     include_str!("sky.wgsl"),
+    include_str!("notice.wgsl"),
     include_str!("multiview.wgsl")
 );
 
@@ -44,6 +46,9 @@ pub(super) struct Layouts {
     pub(super) mask: wgpu::BindGroupLayout,
     /// Group 0 of the sky: its picture and its sampler.
     pub(super) sky: wgpu::BindGroupLayout,
+    /// Group 0 of the notice: its picture and its sampler.
+    #[cfg(feature = "notice")]
+    pub(super) notice: wgpu::BindGroupLayout,
 }
 
 impl Layouts {
@@ -69,6 +74,8 @@ impl Layouts {
             objects: group("objects", &[storage]),
             mask: group("mask", &[texture(0)]),
             sky: group("sky", &[texture(2), sampler(3)]),
+            #[cfg(feature = "notice")]
+            notice: group("notice", &[texture(4), sampler(5)]),
         }
     }
 }
@@ -174,7 +181,9 @@ impl Pipelines {
                     attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Uint32, 2 => Float32x2],
                 }],
                 fragment: if needs.mask { "masked" } else { "opaque" },
+                topology: wgpu::PrimitiveTopology::TriangleList,
                 cull: Some(wgpu::Face::Back),
+                blend: None,
                 depth_write: true,
                 depth_compare: wgpu::CompareFunction::Greater,
             },
@@ -190,10 +199,31 @@ impl Pipelines {
                 vertex: "vertex_sky",
                 buffers: &[],
                 fragment: "sky",
+                topology: wgpu::PrimitiveTopology::TriangleList,
                 cull: None,
+                blend: None,
                 depth_write: false,
                 // Its own depth is zero, as is that of nothing.
                 depth_compare: wgpu::CompareFunction::GreaterEqual,
+            },
+        )
+    }
+
+    #[cfg(feature = "notice")]
+    pub(super) fn build_notice(&self, device: &wgpu::Device) -> wgpu::RenderPipeline {
+        self.build(
+            device,
+            &Parts {
+                label: "notice",
+                groups: &[Some(&self.layouts.notice)],
+                vertex: "vertex_notice",
+                buffers: &[],
+                fragment: "notice",
+                topology: wgpu::PrimitiveTopology::TriangleStrip,
+                cull: None,
+                blend: Some(wgpu::BlendState::ALPHA_BLENDING),
+                depth_write: false,
+                depth_compare: wgpu::CompareFunction::Always,
             },
         )
     }
@@ -217,9 +247,13 @@ impl Pipelines {
                 module: &self.module,
                 entry_point: Some(parts.fragment),
                 compilation_options: wgpu::PipelineCompilationOptions::default(),
-                targets: &[Some(self.eye_format.into())],
+                targets: &[Some(wgpu::ColorTargetState {
+                    blend: parts.blend,
+                    ..self.eye_format.into()
+                })],
             }),
             primitive: wgpu::PrimitiveState {
+                topology: parts.topology,
                 front_face: wgpu::FrontFace::Ccw,
                 cull_mode: parts.cull,
                 ..wgpu::PrimitiveState::default()
@@ -245,7 +279,9 @@ struct Parts<'a> {
     vertex: &'a str,
     buffers: &'a [wgpu::VertexBufferLayout<'a>],
     fragment: &'a str,
+    topology: wgpu::PrimitiveTopology,
     cull: Option<wgpu::Face>,
+    blend: Option<wgpu::BlendState>,
     depth_write: bool,
     depth_compare: wgpu::CompareFunction,
 }

@@ -8,6 +8,8 @@ use crate::{ClientFrame, MaskAtlas, YuvPicture};
 
 use super::atlas::Atlas;
 use super::mesh::Mesh;
+#[cfg(feature = "notice")]
+use super::notice::NoticePass;
 use super::pipelines::{DEPTH_FORMAT, Needs, Pipelines};
 use super::shrink::Shrink;
 use super::sky::SkyPass;
@@ -24,6 +26,16 @@ pub struct RendererConfig {
     pub stereo: Stereo,
     /// Draw four samples a pixel and show their mean.
     pub antialias: bool,
+}
+
+impl RendererConfig {
+    /// Width and height that one eye is drawn at, pixels, before it is shrunk to
+    /// its size; depth is of this size.
+    #[must_use]
+    pub fn drawn_size(self) -> [u32; 2] {
+        let scale = if self.antialias { 2 } else { 1 };
+        self.eye_size.map(|side| side * scale)
+    }
 }
 
 /// Why a frame cannot be drawn on this device. The frame before it stays.
@@ -72,6 +84,8 @@ pub struct Renderer {
     mesh: Mesh,
     objects: Option<wgpu::BindGroup>,
     sky: Option<SkyPass>,
+    #[cfg(feature = "notice")]
+    notice: Option<NoticePass>,
     depth: wgpu::TextureView,
     shrink: Option<Shrink>,
 }
@@ -89,6 +103,8 @@ impl Renderer {
             mesh: Mesh::new(),
             objects: None,
             sky: None,
+            #[cfg(feature = "notice")]
+            notice: None,
             depth: depth(device, config),
             shrink: config
                 .antialias
@@ -107,6 +123,34 @@ impl Renderer {
                 sky,
             )
         });
+    }
+
+    /// Shows a text on a panel in the world, or takes it away. The panel keeps
+    /// its place while only its text changes.
+    #[cfg(feature = "notice")]
+    pub fn set_notice(&mut self, text: Option<&str>) {
+        if self.notice.as_ref().map(NoticePass::text) == text {
+            return;
+        }
+        let before = self.notice.take();
+        self.notice = text.map(|text| {
+            NoticePass::new(
+                &self.device,
+                &self.queue,
+                &self.pipelines,
+                self.config.eye_format,
+                text,
+                before.as_ref(),
+            )
+        });
+    }
+
+    /// Hangs a panel that is new ahead of these eyes.
+    #[cfg(feature = "notice")]
+    pub fn place_notice(&mut self, cameras: [EyeCamera; 2]) {
+        if let Some(notice) = &mut self.notice {
+            notice.place(cameras);
+        }
     }
 
     /// Switches to another frame, whole.
@@ -147,13 +191,26 @@ impl Renderer {
         seconds_of_motion: f32,
         target: &EyeImages,
     ) {
+        self.draw_with_depth(encoder, cameras, seconds_of_motion, target, None);
+    }
+
+    /// As [`draw`](Self::draw), and keeps the depth: reversed, infinite, of
+    /// [`RendererConfig::drawn_size`], `Depth32Float`.
+    pub fn draw_with_depth(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        cameras: [EyeCamera; 2],
+        seconds_of_motion: f32,
+        target: &EyeImages,
+        depth: Option<&EyeImages>,
+    ) {
         self.mesh.move_objects(&self.queue, seconds_of_motion);
         match &self.shrink {
             Some(shrink) => {
-                self.draw_eyes(encoder, cameras, shrink.large());
+                self.draw_eyes(encoder, cameras, shrink.large(), depth);
                 shrink.draw(encoder, target);
             }
-            None => self.draw_eyes(encoder, cameras, target),
+            None => self.draw_eyes(encoder, cameras, target, depth),
         }
     }
 
@@ -162,12 +219,21 @@ impl Renderer {
         encoder: &mut wgpu::CommandEncoder,
         cameras: [EyeCamera; 2],
         target: &EyeImages,
+        depth: Option<&EyeImages>,
     ) {
         match self.config.stereo {
-            Stereo::Multiview => self.draw_pass(encoder, cameras, target.array()),
+            Stereo::Multiview => {
+                self.draw_pass(
+                    encoder,
+                    cameras,
+                    target.array(),
+                    depth.map(EyeImages::array),
+                );
+            }
             Stereo::TwoPass => {
-                for (camera, layer) in cameras.into_iter().zip(target.layers()) {
-                    self.draw_pass(encoder, [camera; 2], layer);
+                for (eye, camera) in cameras.into_iter().enumerate() {
+                    let depth = depth.map(|depth| &depth.layers()[eye]);
+                    self.draw_pass(encoder, [camera; 2], &target.layers()[eye], depth);
                 }
             }
         }
@@ -178,6 +244,7 @@ impl Renderer {
         encoder: &mut wgpu::CommandEncoder,
         cameras: [EyeCamera; 2],
         color: &wgpu::TextureView,
+        kept_depth: Option<&wgpu::TextureView>,
     ) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("eyes"),
@@ -191,11 +258,14 @@ impl Renderer {
                 },
             })],
             depth_stencil_attachment: Some(wgpu::RenderPassDepthStencilAttachment {
-                view: &self.depth,
+                view: kept_depth.unwrap_or(&self.depth),
                 depth_ops: Some(wgpu::Operations {
                     // Reversed Z: zero is infinitely far.
                     load: wgpu::LoadOp::Clear(0.0),
-                    store: wgpu::StoreOp::Discard,
+                    store: match kept_depth {
+                        Some(_) => wgpu::StoreOp::Store,
+                        None => wgpu::StoreOp::Discard,
+                    },
                 }),
                 stencil_ops: None,
             }),
@@ -206,6 +276,10 @@ impl Renderer {
         if let Some(sky) = &self.sky {
             let rays = cameras.map(EyeCamera::world_ray_from_ndc);
             sky.draw(&mut pass, bytemuck::bytes_of(&rays));
+        }
+        #[cfg(feature = "notice")]
+        if let Some(notice) = &self.notice {
+            notice.draw(&mut pass, cameras.map(EyeCamera::clip_from_world));
         }
     }
 
@@ -312,13 +386,13 @@ fn depth(device: &wgpu::Device, config: RendererConfig) -> wgpu::TextureView {
         Stereo::Multiview => 2,
         Stereo::TwoPass => 1,
     };
-    let scale = if config.antialias { 2 } else { 1 };
+    let [width, height] = config.drawn_size();
     device
         .create_texture(&wgpu::TextureDescriptor {
             label: Some("depth"),
             size: wgpu::Extent3d {
-                width: config.eye_size[0] * scale,
-                height: config.eye_size[1] * scale,
+                width,
+                height,
                 depth_or_array_layers: layers,
             },
             mip_level_count: 1,

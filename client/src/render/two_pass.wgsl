@@ -14,3 +14,8 @@ fn vertex_moving(corner: Corner) -> Point {
 fn vertex_sky(@builtin(vertex_index) vertex: u32) -> Ray {
     return sky_corner(0u, vertex);
 }
+
+@vertex
+fn vertex_notice(@builtin(vertex_index) vertex: u32) -> OnPanel {
+    return notice_corner(0u, vertex);
+}

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use glam::Vec3;
 use shadecast_protocol::{
-    ClientTime, EyeView, Pose, Refusal, ResetReason, ToClient, ToServer, Welcome, WireError,
+    ClientTime, EyeView, Hand, Pose, Refusal, ResetReason, ToClient, ToServer, Welcome, WireError,
 };
 use thiserror::Error;
 
@@ -32,7 +32,7 @@ pub enum Input {
     Tick,
 }
 
-/// Where the head is and will be; a view report without its number.
+/// Where the head is and will be, and what the hands do; a view report without its number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeadView {
     /// When the pose was sampled.
@@ -49,6 +49,8 @@ pub struct HeadView {
     pub eyes: [EyeView; 2],
     /// Pixels of one eye's picture, width and height.
     pub eye_resolution: [u16; 2],
+    /// Left and right controller; none for one that is not there.
+    pub hands: [Option<Hand>; 2],
 }
 
 /// Why a connection ended or was not made.
@@ -66,6 +68,10 @@ pub enum Disconnection {
 
 /// What is to be done.
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::large_enum_variant,
+    reason = "an output is done at once; only a few ever wait"
+)]
 pub enum Output {
     /// Make a connection; any earlier one is gone.
     Connect,

@@ -146,6 +146,7 @@ fn head_view(sampled_at: u64) -> HeadView {
         angular_velocity: Vec3::ZERO,
         eyes: [eye; 2],
         eye_resolution: [256, 256],
+        hands: [None; 2],
     }
 }
 

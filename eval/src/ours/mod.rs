@@ -113,6 +113,7 @@ impl Ours {
             angular_velocity: Vec3::ZERO,
             eyes: [eye; 2],
             eye_resolution: [self.side; 2],
+            hands: [None; 2],
         };
         let first = self.next == FrameId(0);
         let order = FrameOrder {

@@ -6,9 +6,9 @@ use glam::{Quat, Vec3};
 use proptest::{array::uniform2, collection::vec, prelude::*, sample::select};
 use shadecast_protocol::{
     Acknowledgement, Block, BlockMask, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId,
-    Hello, Level, MAX_PATCHES, MAX_VERTICES, Motion, ObjectId, PatchGeometry, PatchId, PatchShape,
-    Picture, Placement, Pose, Refusal, ResetReason, Secret, ServerTime, Sky, ToClient, ToServer,
-    Update, UpdateTiming, Vertex, VertexId, ViewReport, ViewSeq, Welcome,
+    Hand, Hello, Level, MAX_PATCHES, MAX_VERTICES, Motion, ObjectId, PatchGeometry, PatchId,
+    PatchShape, Picture, Placement, Pose, Refusal, ResetReason, Secret, ServerTime, Sky, ToClient,
+    ToServer, Update, UpdateTiming, Vertex, VertexId, ViewReport, ViewSeq, Welcome,
 };
 
 use crate::samples::{to_client, to_server};
@@ -92,16 +92,23 @@ fn view() -> impl Strategy<Value = ToServer> {
     let times = uniform2(any::<u64>());
     let velocities = (point(), point());
     let resolution = uniform2(16..=8192_u16);
+    let hand = (pose(), any::<bool>(), any::<u16>());
+    let hand = hand.prop_map(|(world_from_aim, pressed, presses)| Hand {
+        world_from_aim,
+        pressed,
+        presses,
+    });
+    let hands = uniform2(prop::option::of(hand));
     (
         any::<u32>(),
         times,
         pose(),
         velocities,
         uniform2(eye),
-        resolution,
+        (resolution, hands),
     )
         .prop_map(
-            |(seq, times, world_from_head, (linear, angular), eyes, eye_resolution)| {
+            |(seq, times, world_from_head, (linear, angular), eyes, (eye_resolution, hands))| {
                 ToServer::View(ViewReport {
                     seq: ViewSeq(seq),
                     sampled_at: ClientTime(times[0].min(times[1])),
@@ -111,6 +118,7 @@ fn view() -> impl Strategy<Value = ToServer> {
                     angular_velocity: angular,
                     eyes,
                     eye_resolution,
+                    hands,
                 })
             },
         )

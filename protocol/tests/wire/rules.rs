@@ -65,6 +65,8 @@ fn views_are_finite_and_possible() {
     assert_eq!(bad_view(|v| v.eye_resolution[0] = 15), "eye resolution");
     assert_eq!(bad_view(|v| v.eye_resolution[1] = 8193), "eye resolution");
     assert_eq!(bad_view(|v| v.display_at = ClientTime(0)), "display time");
+    let nowhere = |v: &mut ViewReport| v.hands[1].as_mut().unwrap().world_from_aim.position.x = nan;
+    assert_eq!(bad_view(nowhere), "aim");
 }
 
 #[track_caller]
@@ -72,7 +74,7 @@ fn bad_welcome(change: impl FnOnce(&mut Welcome)) -> &'static str {
     let mut welcome = samples::welcome();
     change(&mut welcome);
     let body = postcard::to_stdvec(&welcome).unwrap();
-    let bytes = [&b"shadecast\x02\x00\x10"[..], &body].concat();
+    let bytes = [&b"shadecast\x03\x00\x10"[..], &body].concat();
     let what = refused(ToClient::decode(&bytes));
     assert_eq!(refused(ToClient::Welcome(welcome).encode()), what);
     what

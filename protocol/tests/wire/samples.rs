@@ -3,8 +3,8 @@
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
     Acknowledgement, Block, BlockMask, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId,
-    Hello, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Picture, Placement, Pose,
-    Refusal, ResetReason, Secret, ServerTime, Sky, ToClient, ToServer, Update, UpdateTiming,
+    Hand, Hello, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Picture, Placement,
+    Pose, Refusal, ResetReason, Secret, ServerTime, Sky, ToClient, ToServer, Update, UpdateTiming,
     Vertex, VertexId, ViewReport, ViewSeq, Welcome,
 };
 
@@ -45,6 +45,14 @@ pub(crate) fn view() -> ViewReport {
         angular_velocity: Vec3::new(0.0, 2.0, 0.0),
         eyes: [eye(-0.03125), eye(0.03125)],
         eye_resolution: [2064, 2208],
+        hands: [
+            None,
+            Some(Hand {
+                world_from_aim: pose(),
+                pressed: true,
+                presses: 300,
+            }),
+        ],
     }
 }
 

@@ -14,6 +14,10 @@ use shadecast_transport::{Identity, Listener, SentBytes, ServerEnd, ServerLine};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
 /// What the network tells the frame loop.
+#[expect(
+    clippy::large_enum_variant,
+    reason = "messages are most of the events, and a box each would be an allocation each"
+)]
 pub(super) enum Event {
     /// Somebody is there who has proved nothing yet.
     Connected(Connection),

@@ -62,6 +62,7 @@ fn view(seq: u32) -> ViewReport {
         angular_velocity: Vec3::ZERO,
         eyes: [eye; 2],
         eye_resolution: [64; 2],
+        hands: [None; 2],
     }
 }
 

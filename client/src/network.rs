@@ -9,17 +9,15 @@ use std::sync::mpsc;
 use std::thread::JoinHandle;
 use std::time::Duration;
 
-use anyhow::{Context, Result};
-use shadecast_client::render::FrameSender;
-use shadecast_client::{
-    DecodeError, Decoded, DecoderThread, Disconnection, Failure, Input, OpenH264Decoder, Output,
-    Session, SessionConfig, Status,
-};
 use shadecast_protocol::{ToClient, Welcome};
 use shadecast_transport::{ClientEnd, ReceivedBytes, ServerLine, TransportError};
 use tokio::sync::mpsc::{UnboundedReceiver, UnboundedSender, unbounded_channel};
 
-use crate::clock::Clock;
+use crate::render::FrameSender;
+use crate::{
+    Clock, DecodeError, Decoded, Decoder, DecoderThread, Disconnection, Failure, Input, Output,
+    Session, SessionConfig, Status,
+};
 
 /// A session wants to know the time at least this often.
 const TICK: Duration = Duration::from_millis(50);
@@ -29,20 +27,18 @@ const FAREWELL: Duration = Duration::from_secs(1);
 
 /// What the drawing thread hears besides frames.
 #[derive(Debug)]
-pub(crate) enum Event {
+pub enum Event {
     /// A session begins.
     Welcomed(Box<Welcome>),
     /// For the user.
     Status(Status),
-    /// The user pressed Ctrl-C.
-    Interrupted,
     /// The session will not come back.
     Failed(Failure),
 }
 
 /// What has come through the network so far.
 #[derive(Debug, Default)]
-pub(crate) struct Traffic {
+pub struct Traffic {
     video: AtomicU64,
     updates: AtomicU64,
     frames: AtomicU64,
@@ -50,17 +46,17 @@ pub(crate) struct Traffic {
 
 impl Traffic {
     /// Bytes of pictures.
-    pub(crate) fn video_bytes(&self) -> u64 {
+    pub fn video_bytes(&self) -> u64 {
         self.video.load(Relaxed)
     }
 
     /// Bytes of updates.
-    pub(crate) fn update_bytes(&self) -> u64 {
+    pub fn update_bytes(&self) -> u64 {
         self.updates.load(Relaxed)
     }
 
     /// Updates that took effect with their pictures.
-    pub(crate) fn frames(&self) -> u64 {
+    pub fn frames(&self) -> u64 {
         self.frames.load(Relaxed)
     }
 }
@@ -68,34 +64,39 @@ impl Traffic {
 /// The network's thread as the drawing thread sees it. Dropping it takes leave
 /// of the server.
 #[derive(Debug)]
-pub(crate) struct Network {
+pub struct Network {
     inputs: UnboundedSender<Input>,
-    pub(crate) events: mpsc::Receiver<Event>,
-    pub(crate) traffic: Arc<Traffic>,
+    /// What it has to say.
+    pub events: mpsc::Receiver<Event>,
+    /// What it has brought.
+    pub traffic: Arc<Traffic>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Network {
-    /// Starts the threads of network and decoder.
-    pub(crate) fn start(
+    /// Starts the threads of network and `decoder`, whose pictures are at most
+    /// `max_atlas_side` texels wide and high.
+    ///
+    /// # Errors
+    /// When the system gives no threads or no sockets.
+    pub fn start(
         line: ServerLine,
         max_atlas_side: u16,
         clock: Clock,
+        decoder: impl Decoder + Send + 'static,
         frames: FrameSender,
-    ) -> Result<Self> {
+    ) -> std::io::Result<Self> {
         let runtime = tokio::runtime::Builder::new_current_thread()
             .enable_all()
-            .build()
-            .context("cannot start the network's thread")?;
+            .build()?;
         let (inputs, receiver) = unbounded_channel();
         let (events, event_receiver) = mpsc::channel();
         let traffic = Arc::<Traffic>::default();
         let decoded = inputs.clone();
-        let decoder = DecoderThread::spawn(OpenH264Decoder::new(), move |unit| {
+        let decoder = DecoderThread::spawn(decoder, move |unit| {
             // Fails only when the network's thread has ended.
             let _ = decoded.send(Input::Decoded(unit));
-        })
-        .context("cannot start the decoder's thread")?;
+        })?;
         let config = SessionConfig {
             secret: line.secret,
             max_atlas_side,
@@ -115,8 +116,7 @@ impl Network {
         };
         let thread = std::thread::Builder::new()
             .name("network".into())
-            .spawn(move || runtime.block_on(run.run(receiver)))
-            .context("cannot start the network's thread")?;
+            .spawn(move || runtime.block_on(run.run(receiver)))?;
         Ok(Self {
             inputs,
             events: event_receiver,
@@ -126,7 +126,7 @@ impl Network {
     }
 
     /// Tells the session; never waits.
-    pub(crate) fn tell(&self, input: Input) {
+    pub fn tell(&self, input: Input) {
         // The thread ends early only after it said why.
         let _ = self.inputs.send(input);
     }
@@ -166,7 +166,6 @@ enum Happened {
     Told(Option<Input>),
     Received(Result<ToClient, TransportError>),
     Connected(Result<ClientEnd, TransportError>),
-    Interrupted,
     Ticked,
 }
 
@@ -174,16 +173,11 @@ impl Run {
     async fn run(mut self, mut inputs: UnboundedReceiver<Input>) {
         let mut tick = tokio::time::interval(TICK);
         tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Skip);
-        let mut interrupted = Box::pin(interrupts());
         loop {
             let happened = tokio::select! {
                 input = inputs.recv() => Happened::Told(input),
                 message = receive(self.end.as_ref()) => Happened::Received(message),
                 connected = connect(self.connecting.as_mut()) => Happened::Connected(connected),
-                () = &mut interrupted => {
-                    interrupted = Box::pin(interrupts());
-                    Happened::Interrupted
-                }
                 _ = tick.tick() => Happened::Ticked,
             };
             let input = match happened {
@@ -198,10 +192,6 @@ impl Run {
                     Input::Connected
                 }
                 Happened::Connected(Err(error)) => self.lost(error),
-                Happened::Interrupted => {
-                    self.report(Event::Interrupted);
-                    Input::Tick
-                }
                 Happened::Ticked => Input::Tick,
             };
             let leaves = matches!(input, Input::Leave);
@@ -294,14 +284,6 @@ impl Run {
             // A server that does not hear it finds out by itself.
             let _ = tokio::time::timeout(FAREWELL, end.closed()).await;
         }
-    }
-}
-
-/// Ends at the next Ctrl-C.
-async fn interrupts() {
-    if tokio::signal::ctrl_c().await.is_err() {
-        // Without a handler, Ctrl-C ends the program as it always does.
-        pending().await
     }
 }
 

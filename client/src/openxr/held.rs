@@ -1,0 +1,154 @@
+//! What a headset holds of the world, whatever becomes of its runtime and of
+//! the network: both come back, and the world is still there.
+
+use std::sync::Arc;
+use std::time::Duration;
+
+use shadecast_protocol::{ClientTime, Pose, Sky, Welcome};
+
+use crate::render::FrameReceiver;
+use crate::{ClientFrame, Status};
+
+/// A network that brings nothing for this long has stalled, and the user is told.
+const STALL: Duration = Duration::from_millis(500);
+
+/// The newest frame and what belongs to it.
+#[derive(Debug)]
+pub(super) struct Held {
+    frames: FrameReceiver,
+    pub(super) shown: Option<Arc<ClientFrame>>,
+    pub(super) sky: Option<Sky>,
+    /// The sky has not been drawn yet.
+    pub(super) sky_is_new: bool,
+    /// Where the server put the play space.
+    home: Option<Pose>,
+    /// Where it is by now.
+    pub(super) world_from_play: Pose,
+    /// When something last came, or was first waited for.
+    heard_at: Option<ClientTime>,
+    status: &'static str,
+    /// Said by whoever runs the headset, and shown until it is taken back.
+    said: Option<String>,
+}
+
+impl Held {
+    pub(super) fn new(frames: FrameReceiver) -> Self {
+        Self {
+            frames,
+            shown: None,
+            sky: None,
+            sky_is_new: false,
+            home: None,
+            world_from_play: Pose::IDENTITY,
+            heard_at: None,
+            status: "Connecting to the server",
+            said: None,
+        }
+    }
+
+    /// A session with the server begins. A user who walked away from where the
+    /// server puts the play space stays there when the server comes back.
+    pub(super) fn welcome(&mut self, welcome: &Welcome) {
+        if self.home != Some(welcome.world_from_play) {
+            self.home = Some(welcome.world_from_play);
+            self.world_from_play = welcome.world_from_play;
+        }
+        self.sky = Some(welcome.sky.clone());
+        self.sky_is_new = true;
+    }
+
+    pub(super) fn say(&mut self, sentence: Option<String>) {
+        self.said = sentence;
+    }
+
+    pub(super) fn take_status(&mut self, status: &Status) {
+        self.status = match status {
+            Status::Connecting => "Connecting to the server",
+            Status::Filling | Status::Recovering(_) | Status::Streaming => {
+                "Waiting for pictures from the server"
+            }
+            Status::Reconnecting { .. } => "The connection is lost; trying again",
+        };
+    }
+
+    /// What is to be shown instead of `shown`, if something came.
+    pub(super) fn take_newest(&mut self, now: ClientTime) -> Option<Arc<ClientFrame>> {
+        self.heard_at.get_or_insert(now);
+        let frame = self.frames.take_newest()?;
+        self.heard_at = Some(now);
+        Some(frame)
+    }
+
+    /// What the user is told at this time, if anything.
+    pub(super) fn notice(&self, now: ClientTime) -> Option<&str> {
+        if let Some(said) = &self.said {
+            return Some(said);
+        }
+        let since = now.0.saturating_sub(self.heard_at?.0);
+        (since > STALL.as_nanos() as u64).then_some(self.status)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use shadecast_protocol::Codec;
+
+    use super::*;
+    use crate::render::frame_channel;
+
+    fn welcome(x: f32) -> Welcome {
+        Welcome {
+            codec: Codec::H264,
+            atlas_size: [64; 2],
+            superblock: 8,
+            world_from_play: Pose {
+                position: Vec3::X * x,
+                ..Pose::IDENTITY
+            },
+            sky: Sky {
+                width: 1,
+                height: 1,
+                rgb: vec![9; 3],
+            },
+        }
+    }
+
+    #[test]
+    fn whoever_walked_stays_there_when_the_same_server_comes_back() {
+        let (_sender, receiver) = frame_channel();
+        let mut held = Held::new(receiver);
+        held.welcome(&welcome(2.0));
+        held.world_from_play.position.z = -3.0;
+        held.welcome(&welcome(2.0));
+        assert_eq!(held.world_from_play.position, Vec3::new(2.0, 0.0, -3.0));
+        held.welcome(&welcome(5.0));
+        assert_eq!(
+            held.world_from_play.position,
+            Vec3::X * 5.0,
+            "another scene"
+        );
+    }
+
+    #[test]
+    fn a_stall_is_told_after_half_a_second() {
+        let (_sender, receiver) = frame_channel();
+        let mut held = Held::new(receiver);
+        let at = |ms: u64| ClientTime(7_000_000_000 + ms * 1_000_000);
+        assert_eq!(held.notice(at(0)), None, "nothing was waited for yet");
+        assert!(held.take_newest(at(0)).is_none());
+        assert_eq!(held.notice(at(500)), None);
+        assert_eq!(held.notice(at(501)), Some("Connecting to the server"));
+        let lost = Status::Reconnecting {
+            reason: "gone".into(),
+            after: Duration::ZERO,
+        };
+        held.take_status(&lost);
+        assert!(
+            held.notice(at(501))
+                .is_some_and(|text| text.contains("lost"))
+        );
+        held.say(Some("The secret is wrong".into()));
+        assert_eq!(held.notice(at(1)), Some("The secret is wrong"));
+    }
+}

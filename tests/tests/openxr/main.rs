@@ -1,0 +1,10 @@
+//! The headset client against a simulated runtime.
+
+mod faults;
+mod hands;
+mod live;
+mod misuse;
+mod multiview;
+mod refusals;
+mod rig;
+mod stall;
