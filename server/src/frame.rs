@@ -9,7 +9,7 @@ use glam::Vec3;
 use shadecast_protocol::{FrameId, Motion, Picture, Pose, Update, UpdateTiming};
 
 use crate::{
-    atlas::{Atlas, AtlasError, AtlasStats, Request, ideal_size},
+    atlas::{Atlas, AtlasError, AtlasShape, AtlasStats, Footprints},
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
@@ -17,7 +17,7 @@ use crate::{
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
     scene::{Material, Scene, SceneFacts},
-    visibility::{Prediction, Visibility, VisiblePatch, eye_of},
+    visibility::{Prediction, Visibility, eye_of},
 };
 
 /// Samples over which a diffuse texel's mean runs at most: beyond it the error
@@ -78,9 +78,9 @@ pub struct FrameStats {
 /// Where a frame's time went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stages {
-    /// Id pictures and marking.
+    /// Id pictures, marking, levels and blocks: one submission.
     pub visibility: Duration,
-    /// Levels and blocks.
+    /// What the client must be told of that.
     pub atlas: Duration,
     /// Path tracing.
     pub light: Duration,
@@ -110,6 +110,7 @@ pub struct Pipeline {
     gpu_scene: GpuScene,
     scene: PatchedScene,
     visibility: Visibility,
+    footprints: Footprints,
     atlas: Atlas,
     schedule: Schedule,
     light: Light,
@@ -134,8 +135,11 @@ impl Pipeline {
         encoder: Box<dyn VideoEncoder>,
         exposure: f32,
     ) -> Result<Self, FrameError> {
-        let atlas = Atlas::new(size, superblock)?;
+        let shape = AtlasShape::new(size, superblock)?;
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
+        let (pixels, patches) = (visibility.pixels(), scene.patches.len() as u32);
+        let atlas = Atlas::new(&gpu, shape, patches, pixels)?;
+        let footprints = Footprints::new(&gpu, &gpu_scene, &scene, pixels, atlas.wishes())?;
         let light = Light::new(&gpu, &gpu_scene, size)?;
         let picture = PictureConversion::new(&gpu, light.shown(), size)?;
         let lasting = scene
@@ -151,6 +155,7 @@ impl Pipeline {
             gpu_scene,
             scene,
             visibility,
+            footprints,
             atlas,
             light,
             picture,
@@ -220,17 +225,21 @@ impl Pipeline {
         let poses: Vec<Pose> = motions.iter().map(|motion| motion.pose).collect();
         self.gpu_scene.set_poses(&self.gpu, &poses);
 
-        let visible =
-            self.visibility
-                .potential(&self.gpu, &self.gpu_scene, &order.prediction, &poses)?;
-        stages.visibility = lap();
-
         let eye = eye_of(&order.prediction);
         let in_objects = poses.iter().map(|pose| pose.inverse().transform_point(eye));
         let eyes: Vec<Vec3> = std::iter::once(eye).chain(in_objects).collect();
         let pixels_per_radian = order.prediction.pixels_per_radian();
-        let requests = self.requests(&visible, &eyes, pixels_per_radian);
-        let placed = self.atlas.place(&requests);
+        let (gpu, gpu_scene) = (&self.gpu, &self.gpu_scene);
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.visibility
+            .record(gpu, &mut encoder, gpu_scene, &order.prediction, &poses);
+        self.footprints
+            .record(gpu, &mut encoder, gpu_scene, &eyes, pixels_per_radian);
+        let placed = self.atlas.place(gpu, encoder)?;
+        stages.visibility = lap();
+
         let mut moved = placed.moved.iter().peekable();
         for placement in &placed.placements {
             let old = moved.next_if(|(patch, ..)| *patch == placement.patch);
@@ -241,9 +250,8 @@ impl Pipeline {
         let news = self.known.news(&self.scene, &placed.placements, &motions);
         stages.atlas = lap();
 
-        let lit = visible.iter().filter_map(|patch| {
-            Some((patch.patch, self.atlas.block_of(patch.patch)?, patch.pixels))
-        });
+        let lit = (placed.visible.iter())
+            .filter_map(|visible| Some((visible.patch, visible.block?, visible.pixels)));
         let jobs = self
             .schedule
             .choose(&self.scene.patches, lit.clone(), order.paths, &eyes);
@@ -309,38 +317,13 @@ impl Pipeline {
             },
             stats: FrameStats {
                 stages,
-                visible: visible.len() as u32,
+                visible: placed.visible.len() as u32,
                 unplaced: placed.unplaced,
                 bias: placed.bias,
                 atlas: placed.stats,
                 paths: jobs.iter().map(Job::paths).sum(),
             },
         })
-    }
-
-    /// What each visible patch deserves, seen from between the eyes; `eyes[n]` is
-    /// that point in the space of `ObjectId(n)`.
-    fn requests(
-        &self,
-        visible: &[VisiblePatch],
-        eyes: &[Vec3],
-        pixels_per_radian: f32,
-    ) -> Vec<Request> {
-        visible
-            .iter()
-            .map(|visible| {
-                let patch = &self.scene.patches[visible.patch.0 as usize];
-                let eye = eyes[usize::from(patch.object.0)];
-                let corners = patch
-                    .corners
-                    .map(|corner| self.scene.scene.positions[corner as usize]);
-                Request {
-                    patch: visible.patch,
-                    ideal: ideal_size(patch.shape, &corners, eye, pixels_per_radian),
-                    importance: visible.pixels as f32,
-                }
-            })
-            .collect()
     }
 }
 

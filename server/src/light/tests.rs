@@ -98,6 +98,8 @@ fn placed(block: Block, old: Option<Block>) -> Placed {
     Placed {
         epoch: Epoch(1),
         reset: false,
+        out_of_memory: false,
+        visible: Vec::new(),
         removals: Vec::new(),
         placements: vec![Placement { patch, block }],
         moved: old.map(|old| (patch, old, block)).into_iter().collect(),
