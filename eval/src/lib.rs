@@ -10,6 +10,7 @@ pub mod demo;
 pub mod leave_out;
 mod metrics;
 mod ours;
+pub mod packing;
 mod progress;
 mod reference;
 mod report;

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::{convergence, demo, leave_out, sequence, speed, stress};
+use shadecast_eval::{convergence, demo, leave_out, packing, sequence, speed, stress};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -33,6 +33,13 @@ enum Command {
     /// away, and with everything in. Fails where the pictures differ. Writes
     /// leave-out.csv and .md.
     LeaveOut(leave_out::Options),
+    /// Measures how fast and how well the atlas is managed.
+    ///
+    /// The allocator on the GPU, its twin on the CPU and a quadtree along the same
+    /// walk, and what columns, block stacks and resets are worth. Fails where GPU and
+    /// twin differ. Writes packing.md, packing-speed.csv, packing-kernels.csv and
+    /// packing-strategies.csv.
+    Packing(packing::Options),
     /// Measures the error of what is displayed while a head or a lamp moves.
     ///
     /// Fresh frames, screen-space filtering (SVGF) and ours get the same time for
@@ -54,6 +61,7 @@ fn main() -> ExitCode {
         Command::Demo(options) => demo::run(&options),
         Command::Convergence(options) => convergence::run(&options),
         Command::LeaveOut(options) => leave_out::run(&options),
+        Command::Packing(options) => packing::run(&options),
         Command::Sequence(options) => sequence::run(&options),
         Command::Speed(options) => speed::run(&options),
         Command::Stress(options) => stress::run(&options),

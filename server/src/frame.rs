@@ -9,15 +9,15 @@ use glam::Vec3;
 use shadecast_protocol::{FrameId, Motion, Picture, Pose, Update, UpdateTiming};
 
 use crate::{
-    atlas::{Atlas, AtlasError, AtlasStats, Request, ideal_size},
+    atlas::{Atlas, AtlasError, AtlasShape, AtlasStats, Footprints},
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
     light::{Job, Lasting, Light, Repeats, Schedule, Viewer},
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
-    scene::{Material, Scene},
-    visibility::{Prediction, Visibility, VisiblePatch, eye_of},
+    scene::{Material, Scene, SceneFacts},
+    visibility::{Prediction, Visibility, eye_of},
 };
 
 /// Samples over which a diffuse texel's mean runs at most: beyond it the error
@@ -78,9 +78,9 @@ pub struct FrameStats {
 /// Where a frame's time went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stages {
-    /// Id pictures and marking.
+    /// Id pictures, marking, levels and blocks: one submission.
     pub visibility: Duration,
-    /// Levels and blocks.
+    /// What the client must be told of that.
     pub atlas: Duration,
     /// Path tracing.
     pub light: Duration,
@@ -110,6 +110,7 @@ pub struct Pipeline {
     gpu_scene: GpuScene,
     scene: PatchedScene,
     visibility: Visibility,
+    footprints: Footprints,
     atlas: Atlas,
     schedule: Schedule,
     light: Light,
@@ -117,6 +118,7 @@ pub struct Pipeline {
     encoder: Box<dyn VideoEncoder>,
     known: Known,
     exposure: f32,
+    has_sun: bool,
 }
 
 impl Pipeline {
@@ -133,8 +135,11 @@ impl Pipeline {
         encoder: Box<dyn VideoEncoder>,
         exposure: f32,
     ) -> Result<Self, FrameError> {
-        let atlas = Atlas::new(size, superblock)?;
+        let shape = AtlasShape::new(size, superblock)?;
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
+        let (pixels, patches) = (visibility.pixels(), scene.patches.len() as u32);
+        let atlas = Atlas::new(&gpu, shape, patches, pixels)?;
+        let footprints = Footprints::new(&gpu, &gpu_scene, &scene, pixels, atlas.wishes())?;
         let light = Light::new(&gpu, &gpu_scene, size)?;
         let picture = PictureConversion::new(&gpu, light.shown(), size)?;
         let lasting = scene
@@ -143,12 +148,14 @@ impl Pipeline {
             .map(|patch| lasting(&scene.scene, patch))
             .collect();
         Ok(Self {
+            has_sun: SceneFacts::of(&scene.scene).suns > 0,
             known: Known::nothing(&scene),
             schedule: Schedule::new(lasting),
             gpu,
             gpu_scene,
             scene,
             visibility,
+            footprints,
             atlas,
             light,
             picture,
@@ -218,17 +225,21 @@ impl Pipeline {
         let poses: Vec<Pose> = motions.iter().map(|motion| motion.pose).collect();
         self.gpu_scene.set_poses(&self.gpu, &poses);
 
-        let visible =
-            self.visibility
-                .potential(&self.gpu, &self.gpu_scene, &order.prediction, &poses)?;
-        stages.visibility = lap();
-
         let eye = eye_of(&order.prediction);
         let in_objects = poses.iter().map(|pose| pose.inverse().transform_point(eye));
         let eyes: Vec<Vec3> = std::iter::once(eye).chain(in_objects).collect();
         let pixels_per_radian = order.prediction.pixels_per_radian();
-        let requests = self.requests(&visible, &eyes, pixels_per_radian);
-        let placed = self.atlas.place(&requests);
+        let (gpu, gpu_scene) = (&self.gpu, &self.gpu_scene);
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        self.visibility
+            .record(gpu, &mut encoder, gpu_scene, &order.prediction, &poses);
+        self.footprints
+            .record(gpu, &mut encoder, gpu_scene, &eyes, pixels_per_radian);
+        let placed = self.atlas.place(gpu, encoder)?;
+        stages.visibility = lap();
+
         let mut moved = placed.moved.iter().peekable();
         for placement in &placed.placements {
             let old = moved.next_if(|(patch, ..)| *patch == placement.patch);
@@ -239,24 +250,28 @@ impl Pipeline {
         let news = self.known.news(&self.scene, &placed.placements, &motions);
         stages.atlas = lap();
 
-        let lit = visible.iter().filter_map(|patch| {
-            Some((patch.patch, self.atlas.block_of(patch.patch)?, patch.pixels))
-        });
+        let lit = (placed.visible.iter())
+            .filter_map(|visible| Some((visible.patch, visible.block?, visible.pixels)));
         let jobs = self
             .schedule
-            .choose(&self.scene.patches, lit, order.paths, &eyes);
+            .choose(&self.scene.patches, lit.clone(), order.paths, &eyes);
         let mut encoder = self
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.light.record_moves(&self.gpu, &mut encoder, &placed)?;
         self.gpu.queue.submit([encoder.finish()]);
-        let moved: Vec<Job> = (placed.placements.iter())
+        let mut unlit: Vec<Job> = (placed.placements.iter())
             .map(|placed| {
                 self.schedule
                     .job(&self.scene.patches, placed.patch, placed.block, &eyes)
             })
             .collect();
+        self.schedule.shown(&unlit);
+        if self.has_sun {
+            unlit.extend(self.schedule.stale(&self.scene.patches, lit, &eyes));
+            self.schedule.shown(&unlit);
+        }
         let viewer = Viewer {
             eye,
             pixels_per_radian,
@@ -264,7 +279,7 @@ impl Pipeline {
         };
         let noise = self
             .light
-            .trace(&self.gpu, &self.gpu_scene, &jobs, &moved, viewer)?;
+            .trace(&self.gpu, &self.gpu_scene, &jobs, &unlit, viewer)?;
         self.schedule.traced(&jobs, &noise);
         stages.light = lap();
 
@@ -302,7 +317,7 @@ impl Pipeline {
             },
             stats: FrameStats {
                 stages,
-                visible: visible.len() as u32,
+                visible: placed.visible.len() as u32,
                 unplaced: placed.unplaced,
                 bias: placed.bias,
                 atlas: placed.stats,
@@ -310,32 +325,10 @@ impl Pipeline {
             },
         })
     }
-
-    /// What each visible patch deserves, seen from between the eyes; `eyes[n]` is
-    /// that point in the space of `ObjectId(n)`.
-    fn requests(
-        &self,
-        visible: &[VisiblePatch],
-        eyes: &[Vec3],
-        pixels_per_radian: f32,
-    ) -> Vec<Request> {
-        visible
-            .iter()
-            .map(|visible| {
-                let patch = &self.scene.patches[visible.patch.0 as usize];
-                let eye = eyes[usize::from(patch.object.0)];
-                let corners = patch
-                    .corners
-                    .map(|corner| self.scene.scene.positions[corner as usize]);
-                Request {
-                    patch: visible.patch,
-                    ideal: ideal_size(patch.shape, &corners, eye, pixels_per_radian),
-                    importance: visible.pixels as f32,
-                }
-            })
-            .collect()
-    }
 }
+
+/// Share of the light that the glossy lobe of a dielectric carries.
+const LEAST_SHINE: f32 = 0.1;
 
 /// What a patch's material and place say about how long its light stays true.
 fn lasting(scene: &Scene, patch: &Patch) -> Lasting {
@@ -352,5 +345,6 @@ fn lasting(scene: &Scene, patch: &Patch) -> Lasting {
         },
         point: scene.positions[triangle.positions[0] as usize],
         alpha: roughness * roughness,
+        shine: material.metallic.max(LEAST_SHINE),
     }
 }

@@ -291,6 +291,12 @@ impl StillRenderer {
         &self.gpu.adapter
     }
 
+    /// True where that device is a program on the CPU.
+    #[must_use]
+    pub fn is_software(&self) -> bool {
+        self.gpu.is_software
+    }
+
     /// An unexposed film for pictures of this width and height.
     ///
     /// # Errors

@@ -12,7 +12,7 @@
 use std::time::Duration;
 
 use glam::{Mat4, Vec2, Vec3, vec2};
-use shadecast_protocol::{Fov, PatchId, Pose, ViewReport};
+use shadecast_protocol::{Fov, Pose, ViewReport};
 use shadecast_shaders::visibility::{IDS_SOURCE, MARK_SOURCE};
 use wgpu::ShaderStages;
 
@@ -81,15 +81,6 @@ impl Prediction {
     }
 }
 
-/// A patch that may be seen.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VisiblePatch {
-    /// Its name.
-    pub patch: PatchId,
-    /// Pixels of all id pictures that it covers.
-    pub pixels: u32,
-}
-
 /// The pass that finds the potentially visible set.
 #[derive(Debug)]
 pub struct Visibility {
@@ -100,9 +91,7 @@ pub struct Visibility {
     matrices: wgpu::Buffer,
     most_matrices: usize,
     counts: wgpu::Buffer,
-    readback: wgpu::Buffer,
     target: Option<Target>,
-    patches: usize,
     /// Pictures drawn so far.
     pictures: u32,
 }
@@ -207,31 +196,34 @@ impl Visibility {
             matrices,
             most_matrices,
             counts: gpu.scratch("pixels of patch", bytes)?,
-            readback: gpu.readback("pixels of patch", bytes),
             target: None,
-            patches: scene.patches.len(),
             pictures: 0,
         })
     }
 
-    /// The potentially visible set, by ascending patch.
+    /// Pixels of all id pictures of a frame that each patch covers: none where it
+    /// is not in the potentially visible set.
+    #[must_use]
+    pub fn pixels(&self) -> &wgpu::Buffer {
+        &self.counts
+    }
+
+    /// Records the finding of the potentially visible set.
     ///
     /// `poses[n]` is `world_from_object` of `ObjectId(n + 1)`.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn potential(
+    pub fn record(
         &mut self,
         gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
         gpu_scene: &GpuScene,
         prediction: &Prediction,
         poses: &[Pose],
-    ) -> Result<Vec<VisiblePatch>, GpuError> {
+    ) {
         let [width, height] = prediction.view.eye_resolution;
         let enlarged = |side: u16| ((f32::from(side) * ENLARGEMENT) as u32).clamp(16, LARGEST_SIDE);
         self.ensure_target(gpu, (enlarged(width), enlarged(height)));
         let Some(target) = &self.target else {
-            return Ok(Vec::new());
+            return;
         };
 
         let pixels = vec2(target.size.0 as f32, target.size.1 as f32);
@@ -256,32 +248,14 @@ impl Visibility {
         gpu.queue
             .write_buffer(&self.matrices, 0, bytemuck::cast_slice(&matrices));
 
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         encoder.clear_buffer(&self.counts, 0, None);
         for view in 0..matrices.len() / objects {
-            self.record_ids(&mut encoder, target, gpu_scene, (view * objects) as u32);
+            self.record_ids(encoder, target, gpu_scene, (view * objects) as u32);
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.mark);
             pass.set_bind_group(0, &target.mark_group, &[]);
             pass.dispatch_workgroups(target.size.0.div_ceil(32), target.size.1.div_ceil(8), 1);
         }
-        let bytes = (self.patches * 4) as u64;
-        if bytes == 0 {
-            return Ok(Vec::new());
-        }
-        encoder.copy_buffer_to_buffer(&self.counts, 0, &self.readback, 0, bytes);
-        gpu.submit_and_read(encoder, &self.readback, bytes, |bytes| {
-            (0..)
-                .zip(bytemuck::cast_slice::<u8, u32>(bytes))
-                .filter(|(_, pixels)| **pixels > 0)
-                .map(|(id, &pixels)| VisiblePatch {
-                    patch: PatchId(id),
-                    pixels,
-                })
-                .collect()
-        })
     }
 
     fn record_ids(

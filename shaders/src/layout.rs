@@ -4,7 +4,7 @@ use std::mem::{offset_of, size_of};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::{light, picture, visibility};
+use crate::{atlas, light, picture, visibility};
 
 fn module(name: &str, source: &str) -> naga::Module {
     let module = naga::front::wgsl::parse_str(source)
@@ -58,6 +58,8 @@ fn kernels_validate() {
         ("still", light::STILL_SOURCE),
         ("carry", light::CARRY_SOURCE),
         ("picture", picture::SOURCE),
+        ("atlas memory", atlas::SOURCE),
+        ("footprint", atlas::FOOTPRINT_SOURCE),
         ("ids", visibility::IDS_SOURCE),
         ("mark", visibility::MARK_SOURCE),
     ] {
@@ -176,6 +178,7 @@ fn layouts_match() {
     assert_eq!(u64::from(members(&atlas, "PathState").0), STATE_BYTES);
     assert_eq!(u64::from(members(&atlas, "Ray").0) * 3, RAY_BYTES);
     assert_eq!(u64::from(members(&atlas, "Cell").0), CELL_BYTES);
+    assert_eq!(u64::from(members(&atlas, "Judgement").0), JUDGEMENT_BYTES);
     let still = module("still", STILL_SOURCE);
     same_layout!(
         &still,
@@ -191,4 +194,60 @@ fn layouts_match() {
     same_layout!(&carry, CarryParameters, move_count, atlas_width, padding);
     let planes = module("picture", crate::picture::SOURCE);
     same_layout!(&planes, PictureParameters, size, exposure, padding);
+}
+
+#[test]
+fn layouts_of_the_atlas_match() {
+    use atlas::{ActivePatch, AtlasParameters, AtlasState, FootprintParameters};
+    let memory = module("atlas memory", atlas::SOURCE);
+    same_layout!(
+        &memory,
+        AtlasParameters,
+        patch_count,
+        log2_side,
+        per_row,
+        superblocks,
+        budget,
+        least_free,
+        most_patches,
+        keep_unseen,
+        bias,
+        reset,
+        padding
+    );
+    same_layout!(&memory, ActivePatch, patch_id, pixels, before, after, bits);
+    same_layout!(
+        &memory,
+        AtlasState,
+        active_count,
+        visible,
+        bias,
+        verdict,
+        status,
+        evict,
+        taken,
+        padding,
+        tail_superblock,
+        tail_filled,
+        old_tail,
+        first_fresh,
+        stack_base,
+        stacked,
+        stacked_before,
+        top,
+        requested,
+        released,
+        idle,
+        required,
+        offset
+    );
+    assert_eq!(u64::from(members(&memory, "Tally").0), atlas::TALLY_BYTES);
+    let footprint = module("footprint", atlas::FOOTPRINT_SOURCE);
+    same_layout!(
+        &footprint,
+        FootprintParameters,
+        patch_count,
+        pixels_per_radian,
+        padding
+    );
 }

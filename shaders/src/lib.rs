@@ -5,6 +5,7 @@
 //! are joined as text; what varies is an `override` constant. A test holds the
 //! layout of every host struct against naga's, so that the two cannot drift.
 
+pub mod atlas;
 pub mod light;
 pub mod picture;
 pub mod visibility;

@@ -1,11 +1,9 @@
 //! Where in the atlas each visible patch is shaded.
 //!
-//! A patch keeps its block while its level is unchanged, so that the video
-//! encoder sees a still picture and a path tracer may go on accumulating
-//! wherever shading is still. Once a frame, [`Atlas::place`] chooses levels
-//! that fit (`choice`), then allocates in three phases: *request* (blocks come
-//! back, new ones are counted), *provisioning* (room is found for each level)
-//! and *assignment* (each patch gets its block).
+//! The GPU chooses levels and places blocks, in the same submission that finds
+//! what is visible (`passes`, and the kernels in `shadecast_shaders::atlas`).
+//! The CPU says how full the atlas may be and counts epochs (`policy`), and
+//! reads one list back: what is visible, and what has moved ([`Placed`]).
 //!
 //! Free blocks are never merged, so that memory fragments until an **atlas
 //! reset** drops all of it and places anew, largest blocks first: a new epoch,
@@ -16,35 +14,21 @@
 //! coarser, rather than every picture becoming an IDR.
 //!
 //! Source: Mueller et al., "Shading Atlas Streaming", 2018, sections 4.2 and
-//! 4.3. We differ in keeping blocks of patches that have just gone out of
-//! sight until their room is needed ([`KEEP_UNSEEN`]): rasterised visibility
-//! flickers on small patches, and accumulated light should survive a flicker.
+//! 4.3; the kernels say where they depart.
 
-mod bias;
-mod choice;
-mod level;
+mod footprints;
+mod passes;
 mod place;
-mod superblocks;
+mod policy;
 #[cfg(test)]
 mod tests;
 
 use shadecast_protocol::{Block, Epoch, PatchId, Placement};
 use thiserror::Error;
 
-pub use bias::bias;
-pub use level::{HYSTERESIS, IdealSize, edge_pixels, ideal_size, level, steady_level};
-pub use place::{Atlas, FILL_TARGET, KEEP_UNSEEN};
-
-/// A visible patch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Request {
-    /// Which; a patch that is listed twice counts once.
-    pub patch: PatchId,
-    /// What it deserves.
-    pub ideal: IdealSize,
-    /// Visible pixels: what to keep where even the smallest blocks are too many.
-    pub importance: f32,
-}
+pub use footprints::Footprints;
+pub use place::{Atlas, AtlasTwin, KernelTimes};
+pub use policy::{AtlasShape, FILL_TARGET, KEEP_UNSEEN};
 
 /// Why there is no such atlas.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
@@ -65,14 +49,18 @@ pub enum AtlasError {
     },
 }
 
-/// What one call of [`Atlas::place`] changed. All lists ascend by patch.
+/// What one frame of the atlas changed. All lists ascend by patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     /// The epoch that the placement belongs to.
     pub epoch: Epoch,
-    /// True when the epoch begins with this call: nothing that was placed
+    /// True when the epoch begins with this frame: nothing that was placed
     /// before is any longer, and the picture must be an IDR.
     pub reset: bool,
+    /// True when memory was too fragmented for the frame, and so the atlas was reset.
+    pub out_of_memory: bool,
+    /// What may be seen.
+    pub visible: Vec<VisiblePatch>,
     /// Patches that lose their block. Empty on a reset, which drops all.
     pub removals: Vec<PatchId>,
     /// Patches that get a block; on a reset, all that have one.
@@ -84,8 +72,19 @@ pub struct Placed {
     pub bias: f32,
     /// Visible patches without a block, the least important ones.
     pub unplaced: u32,
-    /// The atlas after the call.
+    /// The atlas after the frame.
     pub stats: AtlasStats,
+}
+
+/// A patch that may be seen.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VisiblePatch {
+    /// Its name.
+    pub patch: PatchId,
+    /// Pixels of all id pictures that it covers.
+    pub pixels: u32,
+    /// Where it is shaded, if there is room.
+    pub block: Option<Block>,
 }
 
 /// How full an atlas is.

@@ -1,288 +1,217 @@
-//! The atlas itself: one call a frame, three phases.
+//! The atlas itself: one call a frame. Its twin gives the same on the CPU.
 
-use shadecast_protocol::{Block, Epoch, Level, MIN_LOG2_SIDE, PatchId, Placement};
+use std::time::Duration;
+
+use shadecast_protocol::Epoch;
+use shadecast_shaders::atlas::{Memory, Outcome, Placer, Seen, Superblocks, status};
 
 use super::{
-    AtlasError, AtlasStats, Placed, Request,
-    choice::Chosen,
-    superblocks::{Counts, Provision, Superblocks, count_of},
+    Placed,
+    passes::{Passes, Threads, kernel_names},
+    policy::{AtlasShape, Policy},
 };
+use crate::gpu::{Gpu, GpuError};
 
-/// Share of the superblocks that the visible set may need in an empty atlas.
-/// For an eye that walks and looks about, 0.75 halves the resets of 0.85 and
-/// costs a quarter of an octave of bias; this lies between.
-pub const FILL_TARGET: f32 = 0.8;
+/// Kernels in their order, and how long the device took for each.
+pub type KernelTimes = Vec<(&'static str, Duration)>;
 
-/// The fill target never falls below this: with three quarters of the atlas
-/// to spare, even a whole new view fits beside the old one.
-const LEAST_FILL: f32 = 0.25;
-
-/// Share of superblocks that must be free after provisioning; else the atlas
-/// is reset. SAS 2018, section 5.4, sets its high-water mark at 96 %.
-const HIGH_WATER_FREE: f32 = 0.04;
-
-/// Calls of `place` between two resets below which the second is too soon:
-/// SAS 2018, section 5.8, sends its I-frames five frames apart.
-const RESET_SPACING: u32 = 5;
-
-/// A reset that comes too soon multiplies the fill target by this.
-const FILL_AFTER_EARLY_RESET: f32 = 0.85;
-
-/// What a call without a reset adds to the fill target, up to
-/// [`FILL_TARGET`]: slow against [`RESET_SPACING`], so that it does not swing.
-const FILL_RECOVERY: f32 = 0.002;
-
-/// Calls of `place` for which a patch that is no longer visible keeps its
-/// block, unless the room is needed: a glance away and back at 30 updates a
-/// second. The room is needed as soon as new blocks would open another
-/// superblock; keeping unseen blocks beyond that tripled the atlas resets.
-pub const KEEP_UNSEEN: u32 = 9;
-
-/// The shading atlas's memory and who has which part of it.
-#[derive(Clone, Debug)]
+/// The shading atlas's memory on the GPU, and who has which part of it.
+#[derive(Debug)]
 pub struct Atlas {
-    pub(super) superblocks: Superblocks,
-    /// By [`PatchId`], as far as any was seen.
-    pub(super) patches: Vec<PatchState>,
-    /// Patches that have a block.
-    resident: Vec<PatchId>,
-    epoch: Epoch,
-    /// Counts calls of `place`, from 1.
-    pub(super) turn: u32,
-    /// Turn of the last reset for want of memory.
-    last_reset: Option<u32>,
-    resets: u32,
-    reset_asked: bool,
-    pub(super) fill: f32,
-    pub(super) bias: f32,
-}
-
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct PatchState {
-    pub(super) block: Option<Block>,
-    /// The turn in which it was last visible; 0 is never.
-    pub(super) seen: u32,
-}
-
-/// A patch that needs a block, as the request phase leaves it.
-struct Wanted {
-    patch: PatchId,
-    level: Level,
-    /// How many asked for the level before it.
-    slot: u32,
+    policy: Policy,
+    passes: Passes,
 }
 
 impl Atlas {
-    /// An empty atlas of `size` texels, cut into superblocks of side `superblock`.
+    /// An empty atlas for a scene of so many patches. `pixels` will hold those
+    /// that each patch covers in this frame, as words.
     ///
     /// # Errors
-    /// When the superblock is no power of two, or does not tile the atlas.
-    pub fn new(size: [u16; 2], superblock: u16) -> Result<Self, AtlasError> {
-        if !superblock.is_power_of_two() || superblock <= 1 << MIN_LOG2_SIDE {
-            return Err(AtlasError::Superblock(superblock));
-        }
-        if size.iter().any(|&side| side == 0 || side % superblock != 0) {
-            return Err(AtlasError::Size { size, superblock });
-        }
+    /// When lists of so many patches are larger than the device binds.
+    pub fn new(
+        gpu: &Gpu,
+        shape: AtlasShape,
+        patches: u32,
+        pixels: &wgpu::Buffer,
+    ) -> Result<Self, GpuError> {
         Ok(Self {
-            superblocks: Superblocks::new(size, superblock.trailing_zeros() as u8),
-            patches: Vec::new(),
-            resident: Vec::new(),
-            epoch: Epoch(0),
-            turn: 0,
-            last_reset: None,
-            resets: 0,
-            reset_asked: false,
-            fill: FILL_TARGET,
-            bias: 0.0,
+            policy: Policy::new(shape),
+            passes: Passes::new(gpu, shape, patches, pixels, Threads::best(gpu))?,
         })
     }
 
-    /// Where a patch is shaded.
+    /// What each patch deserves, as [`Wish::word`](shadecast_shaders::atlas::Wish::word):
+    /// to be filled in for all visible ones.
     #[must_use]
-    pub fn block_of(&self, patch: PatchId) -> Option<Block> {
-        self.patches.get(patch.0 as usize)?.block
+    pub fn wishes(&self) -> &wgpu::Buffer {
+        self.passes.wishes()
     }
 
     /// The current epoch.
     #[must_use]
     pub fn epoch(&self) -> Epoch {
-        self.epoch
+        self.policy.epoch()
     }
 
     /// Makes the next [`place`](Self::place) reset the atlas, for a client
     /// that lost track.
     pub fn force_reset(&mut self) {
-        self.reset_asked = true;
+        self.policy.force_reset();
     }
 
     /// Gives every visible patch a block that suits it, and moves as few as
-    /// possible.
+    /// possible. Submits what is recorded before.
     ///
-    /// The same calls in the same order give the same placement. State grows
-    /// with the largest patch id seen.
-    pub fn place(&mut self, visible: &[Request]) -> Placed {
-        self.turn += 1;
-        let choice = self.choose(visible);
-        let mut removals = Vec::new();
-        self.remove_unseen_for(KEEP_UNSEEN, &mut removals);
-        let (mut wanted, mut counts) = self.request(&choice.patches);
-
-        if self.superblocks.fresh_superblocks(&counts) > 0 {
-            self.remove_unseen_for(1, &mut removals);
-        }
-        let mut provision = self.superblocks.provision(&counts);
-        let memory_is_short = provision.is_err() || self.above_high_water();
-        let reset = memory_is_short || self.reset_asked;
-        if reset {
-            removals.clear();
-            self.reset(memory_is_short);
-            (wanted, counts) = request_all(&choice.patches);
-            provision = self.superblocks.provision(&counts);
-        } else {
-            self.fill = (self.fill + FILL_RECOVERY).min(FILL_TARGET);
-        }
-        let provision = provision.expect("levels are chosen to fit an empty atlas");
-        let (placements, moved) = self.assign(wanted, &provision);
-
-        removals.sort_unstable();
-        let unplaced = choice
-            .left_out
-            .iter()
-            .filter(|&&patch| self.block_of(patch).is_none())
-            .count();
-        Placed {
-            epoch: self.epoch,
-            reset,
-            removals,
-            placements,
-            moved,
-            bias: self.bias,
-            unplaced: unplaced as u32,
-            stats: self.stats(),
-        }
-    }
-
-    /// Takes the blocks of patches that have not been visible for `turns`.
-    fn remove_unseen_for(&mut self, turns: u32, removals: &mut Vec<PatchId>) {
-        self.resident.retain(|&patch| {
-            let state = &mut self.patches[patch.0 as usize];
-            let keep = self.turn - state.seen < turns;
-            if !keep && let Some(block) = state.block.take() {
-                self.superblocks.release(block);
-                removals.push(patch);
-            }
-            keep
-        });
-    }
-
-    /// The request phase: patches whose level changed give their block back,
-    /// and all that need one are counted. Their old block stays on record
-    /// until the assignment.
-    fn request(&mut self, chosen: &[Chosen]) -> (Vec<Wanted>, Counts) {
-        let mut counts = Counts::default();
-        let mut wanted = Vec::new();
-        for chosen in chosen {
-            match self.block_of(chosen.patch) {
-                Some(block) if block.level == chosen.level => continue,
-                Some(block) => self.superblocks.release(block),
-                None => {}
-            }
-            wanted.push(Wanted::draw(chosen, &mut counts));
-        }
-        (wanted, counts)
-    }
-
-    fn above_high_water(&self) -> bool {
-        let least_free = (self.superblocks.total() as f32 * HIGH_WATER_FREE) as u32;
-        self.superblocks.free() < least_free
-    }
-
-    /// Drops all placement and begins an epoch. Blocks of visible patches stay
-    /// on record until they are placed anew.
-    fn reset(&mut self, memory_is_short: bool) {
-        if memory_is_short {
-            if self
-                .last_reset
-                .is_some_and(|last| self.turn - last < RESET_SPACING)
-            {
-                self.fill = (self.fill * FILL_AFTER_EARLY_RESET).max(LEAST_FILL);
-            }
-            self.last_reset = Some(self.turn);
-        }
-        self.reset_asked = false;
-        self.resets += 1;
-        self.epoch.0 += 1;
-        self.superblocks.clear();
-        self.resident.retain(|&patch| {
-            let state = &mut self.patches[patch.0 as usize];
-            let visible = state.seen == self.turn;
-            if !visible {
-                state.block = None;
-            }
-            visible
-        });
-    }
-
-    /// The assignment phase. Returns what is placed, and what of it had
-    /// another block before.
-    fn assign(
+    /// The same frames in the same order give the same placement.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn place(
         &mut self,
-        mut wanted: Vec<Wanted>,
-        provision: &Provision,
-    ) -> (Vec<Placement>, Vec<(PatchId, Block, Block)>) {
-        wanted.sort_unstable_by_key(|wanted| wanted.patch);
-        let mut moved = Vec::new();
-        let placements = wanted
-            .into_iter()
-            .map(|Wanted { patch, level, slot }| {
-                let block = self.superblocks.assign(provision, level, slot);
-                match self.patches[patch.0 as usize].block.replace(block) {
-                    Some(old) => moved.push((patch, old, block)),
-                    None => self.resident.push(patch),
-                }
-                Placement { patch, block }
-            })
-            .collect();
-        (placements, moved)
+        gpu: &Gpu,
+        mut encoder: wgpu::CommandEncoder,
+    ) -> Result<Placed, GpuError> {
+        let parameters = self.policy.parameters(self.passes.patches());
+        self.passes.record(gpu, &mut encoder, &parameters, None);
+        self.read(gpu, encoder)
     }
 
-    /// How full the atlas is.
+    /// The same, and how long each kernel ran; nothing where the device has no clock.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn place_timed(&mut self, gpu: &Gpu) -> Result<(Placed, KernelTimes), GpuError> {
+        let mut encoder = gpu
+            .device
+            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        if !gpu
+            .device
+            .features()
+            .contains(wgpu::Features::TIMESTAMP_QUERY)
+        {
+            return Ok((self.place(gpu, encoder)?, KernelTimes::new()));
+        }
+        let count = 2 * kernel_names().count() as u32;
+        let times = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
+            label: Some("atlas"),
+            ty: wgpu::QueryType::Timestamp,
+            count,
+        });
+        let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+            label: Some("times of kernels"),
+            size: u64::from(count) * 8,
+            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
+            mapped_at_creation: false,
+        });
+        let parameters = self.policy.parameters(self.passes.patches());
+        self.passes
+            .record(gpu, &mut encoder, &parameters, Some(&times));
+        encoder.resolve_query_set(&times, 0..count, &resolved, 0);
+        let placed = self.read(gpu, encoder)?;
+        let ticks: Vec<u64> = gpu.read(&resolved, 0..resolved.size())?;
+        let nanoseconds = f64::from(gpu.queue.get_timestamp_period());
+        let spent = ticks.chunks_exact(2).map(|times| {
+            let ticks = times[1].saturating_sub(times[0]);
+            Duration::from_nanos((ticks as f64 * nanoseconds) as u64)
+        });
+        Ok((placed, kernel_names().zip(spent).collect()))
+    }
+
+    fn read(&mut self, gpu: &Gpu, encoder: wgpu::CommandEncoder) -> Result<Placed, GpuError> {
+        let (state, active) = self.passes.submit_and_read(gpu, encoder)?;
+        let outcome = Outcome {
+            active,
+            visible: state.visible,
+            bias: state.bias,
+            status: state.status,
+        };
+        let shape = self.policy.shape();
+        let free = if outcome.status & status::BROKEN == 0 {
+            state.free_texels(shape.log2_side(), shape.superblocks())
+        } else {
+            tracing::error!("the atlas lost count of its blocks; it begins anew");
+            self.passes.clear(gpu)
+        };
+        Ok(self.policy.placed(outcome, free))
+    }
+
+    #[cfg(test)]
+    pub(super) fn with_threads(
+        mut self,
+        gpu: &Gpu,
+        threads: Threads,
+        pixels: &wgpu::Buffer,
+    ) -> Self {
+        let patches = self.passes.patches();
+        self.passes =
+            Passes::new(gpu, self.policy.shape(), patches, pixels, threads).expect("room");
+        self
+    }
+
+    #[cfg(test)]
+    pub(super) fn begin_anew(&mut self, gpu: &Gpu) {
+        self.policy = Policy::new(self.policy.shape());
+        self.passes.clear(gpu);
+    }
+
+    /// Puts more on the stacks than any atlas has room for.
+    #[cfg(test)]
+    pub(super) fn break_stacks(&self, gpu: &Gpu) {
+        use shadecast_shaders::atlas::{AtlasState, LEVELS};
+        let at = std::mem::offset_of!(AtlasState, stacked) as u64;
+        let many = [1_u32 << 24; LEVELS];
+        let queue = &gpu.queue;
+        queue.write_buffer(self.passes.state(), at, bytemuck::cast_slice(&many));
+    }
+}
+
+/// The same on the CPU, for tests and to be compared with; over another memory
+/// it is another strategy.
+#[derive(Clone, Debug)]
+pub struct AtlasTwin<M = Superblocks> {
+    policy: Policy,
+    placer: Placer<M>,
+}
+
+impl AtlasTwin {
+    /// An empty atlas.
     #[must_use]
-    pub fn stats(&self) -> AtlasStats {
-        let free = self.superblocks.free_texels();
-        let superblocks = self.superblocks.total();
-        let texels = u64::from(superblocks) << (2 * self.superblocks.log2_side());
-        AtlasStats {
-            texels,
-            used_texels: texels - free.in_superblocks - free.in_tails - free.in_stacks,
-            stacked_texels: free.in_stacks,
-            tail_texels: free.in_tails,
-            superblocks,
-            free_superblocks: free.superblocks,
-            stacked_blocks: free.stacked,
-            patches: self.resident.len() as u32,
-            resets: self.resets,
+    pub fn new(shape: AtlasShape) -> Self {
+        let memory = Superblocks::new(shape.log2_side(), shape.per_row(), shape.superblocks());
+        Self::over(shape, memory)
+    }
+}
+
+impl<M: Memory> AtlasTwin<M> {
+    /// An empty atlas over this memory.
+    #[must_use]
+    pub fn over(shape: AtlasShape, memory: M) -> Self {
+        Self {
+            policy: Policy::new(shape),
+            placer: Placer::new(memory),
         }
     }
-}
 
-/// The request phase after a reset: all patches need a block.
-fn request_all(chosen: &[Chosen]) -> (Vec<Wanted>, Counts) {
-    let mut counts = Counts::default();
-    let wanted = chosen
-        .iter()
-        .map(|chosen| Wanted::draw(chosen, &mut counts))
-        .collect();
-    (wanted, counts)
-}
+    /// As [`Atlas::epoch`].
+    #[must_use]
+    pub fn epoch(&self) -> Epoch {
+        self.policy.epoch()
+    }
 
-impl Wanted {
-    fn draw(chosen: &Chosen, counts: &mut Counts) -> Self {
-        let Chosen { patch, level } = *chosen;
-        let count = count_of(counts, level);
-        let slot = *count;
-        *count += 1;
-        Self { patch, level, slot }
+    /// As [`Atlas::force_reset`].
+    pub fn force_reset(&mut self) {
+        self.policy.force_reset();
+    }
+
+    /// As [`Atlas::place`]; `seen` ascends by patch.
+    pub fn place(&mut self, seen: &[Seen]) -> Placed {
+        let outcome = self.placer.place(&self.policy.parameters(0), seen);
+        self.policy.placed(outcome, self.placer.free_texels())
+    }
+
+    /// What lies behind it.
+    #[must_use]
+    pub fn memory(&self) -> &M {
+        self.placer.memory()
     }
 }

@@ -78,6 +78,8 @@ impl Gpu {
         }
         let (device, queue) = pollster::block_on(adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("shadecast server"),
+            // For measurements; nothing else needs it.
+            required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
             required_limits: wgpu::Limits {
                 max_storage_buffers_per_shader_stage: STORAGE_BUFFERS,
                 max_storage_buffer_binding_size: offered.max_storage_buffer_binding_size,

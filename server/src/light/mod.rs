@@ -18,7 +18,7 @@ use glam::Vec3;
 use shadecast_protocol::{Block, PatchId};
 use shadecast_shaders::light::{
     ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CELL_BYTES, CELL_COUNT, CarryParameters,
-    LightParameters, Move, NO_BLOCK,
+    JUDGEMENT_BYTES, LightParameters, Move, NO_BLOCK,
 };
 use wgpu::ShaderStages;
 
@@ -133,7 +133,7 @@ impl Light {
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
         let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
         let noise = gpu.scratch("noise", most_blocks * 4)?;
-        let kept = gpu.scratch("kept histories", most_blocks * 8)?;
+        let judgements = gpu.scratch("judgements of blocks", most_blocks * JUDGEMENT_BYTES)?;
         let group = bind(
             gpu,
             &own_layout,
@@ -146,7 +146,7 @@ impl Light {
                 &shown,
                 &texels.moments,
                 &cells,
-                &kept,
+                &judgements,
             ],
         );
         let paths = Paths::new(gpu, gpu_scene, texel_count as u32)?;

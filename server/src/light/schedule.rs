@@ -18,6 +18,11 @@ const COARSEST: u32 = 3;
 const EXPECTED_NOISE: f32 = 0.7;
 /// Samples after which the measured noise is believed as much as the expectation.
 const BELIEF: f32 = 3.0;
+/// Samples that any content counts as at least.
+const LEAST_WORTH: f32 = 0.01;
+/// Turn of the eye, in half widths of the lobe, after which a reflection of the sun is
+/// another one.
+const STALE: f32 = 0.25;
 
 /// A block that gets one path for each of its texels, or for each square of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -81,8 +86,12 @@ struct Lit {
     worth: f32,
     /// Measured standard error, relative.
     noise: f32,
+    /// Samples that its reflections are worth, seen from `view`.
+    glossy_worth: f32,
     /// From where it was seen when it was lit last, as in [`Job`].
     view: Vec3,
+    /// From where it was seen when it was made to be shown last.
+    shown_from: Vec3,
 }
 
 /// How long what is known of a patch's light stays true.
@@ -94,6 +103,8 @@ pub struct Lasting {
     pub point: Vec3,
     /// GGX alpha of its glossiest part: the half width of the lobe, radians.
     pub alpha: f32,
+    /// Share of its light that the glossy lobe carries, roughly.
+    pub shine: f32,
 }
 
 impl Lasting {
@@ -101,10 +112,15 @@ impl Lasting {
     /// instead of `then`, unit vectors: a mirror turns what it shows by twice the
     /// angle of the eye, and half a lobe's width of turning halves their worth.
     fn glossy_keep(&self, then: Vec3, now: Vec3) -> f32 {
+        let turned = self.turned(then, now);
+        1.0 / (1.0 + turned * turned)
+    }
+
+    /// By how many half widths of the lobe what it shows has turned.
+    fn turned(&self, then: Vec3, now: Vec3) -> f32 {
         /// Below this half width a lobe is a mirror to a texel of its size.
         const MIRROR: f32 = 0.02;
-        let turned = 2.0 * now.distance(then) / self.alpha.max(MIRROR);
-        1.0 / (1.0 + turned * turned)
+        2.0 * now.distance(then) / self.alpha.max(MIRROR)
     }
 }
 
@@ -129,11 +145,13 @@ impl Schedule {
     /// A patch got a block: its content was carried over, or is gone.
     pub fn placed(&mut self, patch: PatchId, carried: bool, resized: bool) {
         let lit = &mut self.lit[patch.0 as usize];
-        if !carried {
-            lit.worth = 0.0;
-        } else if resized {
-            lit.worth = lit.worth.min(12.0);
-        }
+        let most = match (carried, resized) {
+            (false, _) => 0.0,
+            (true, true) => 12.0,
+            (true, false) => return,
+        };
+        lit.worth = lit.worth.min(most);
+        lit.glossy_worth = lit.glossy_worth.min(most);
     }
 
     /// The job of lighting each texel of a patch's block once; `eyes[n]` is the
@@ -180,8 +198,9 @@ impl Schedule {
             let believed =
                 (lit.noise * lit.noise * lit.worth + expected * BELIEF) / (lit.worth + BELIEF);
             // Squared error that one more sample removes, per path.
-            let gain =
-                believed / (lit.worth + 1.0) * pixels.max(1) as f32 / block.level.area() as f32;
+            let worth = self.worth(id, job.glossy_keep);
+            let gain = believed * lit.worth / (worth * (worth + 1.0)) * pixels.max(1) as f32
+                / block.level.area() as f32;
             others.push((gain, job));
         }
         let cost = |stride: u32| -> u64 {
@@ -228,6 +247,41 @@ impl Schedule {
         jobs
     }
 
+    /// Samples that a patch's content is worth now that `glossy_keep` of its
+    /// reflections still holds: errors add up by the shares of light that have them.
+    fn worth(&self, id: PatchId, glossy_keep: f32) -> f32 {
+        let lit = &self.lit[id.0 as usize];
+        let shine = self.lasting[id.0 as usize].shine;
+        let glossy = (lit.glossy_worth * glossy_keep).max(LEAST_WORTH);
+        1.0 / ((1.0 - shine) / lit.worth.max(LEAST_WORTH) + shine / glossy)
+    }
+
+    /// Blocks whose reflection of the sun has moved since they were made to be
+    /// shown: it needs no path.
+    #[must_use]
+    pub fn stale(
+        &self,
+        patches: &[Patch],
+        placed: impl Iterator<Item = (PatchId, Block, u32)>,
+        eyes: &[Vec3],
+    ) -> Vec<Job> {
+        placed
+            .map(|(id, block, _)| self.job(patches, id, block, eyes))
+            .filter(|job| {
+                let lit = &self.lit[job.patch.0 as usize];
+                let lasting = &self.lasting[job.patch.0 as usize];
+                lit.worth > 0.0 && lasting.turned(lit.shown_from, job.view) > STALE
+            })
+            .collect()
+    }
+
+    /// Notes that `jobs` were made to be shown, without paths.
+    pub fn shown(&mut self, jobs: &[Job]) {
+        for job in jobs {
+            self.lit[job.patch.0 as usize].shown_from = job.view;
+        }
+    }
+
     /// Notes that `jobs` were traced and how noisy each block is now.
     pub fn traced(&mut self, jobs: &[Job], noise: &[f32]) {
         for (job, &noise) in jobs.iter().zip(noise) {
@@ -235,8 +289,11 @@ impl Schedule {
             lit.drawn = lit.drawn.wrapping_add(1);
             let weight = 0.25_f32.powi(job.log2_stride as i32);
             lit.worth = lit.worth.min(job.longest_history) + weight;
+            lit.glossy_worth =
+                (lit.glossy_worth * job.glossy_keep).min(job.longest_history) + weight;
             lit.noise = if noise.is_finite() { noise } else { 0.0 };
             lit.view = job.view;
+            lit.shown_from = job.view;
         }
     }
 }
@@ -250,6 +307,7 @@ mod tests {
         longest_history: 1e4,
         point: Vec3::Z,
         alpha: 1.0,
+        shine: 0.0,
     };
 
     fn patches(count: u32) -> Vec<Patch> {
@@ -303,6 +361,31 @@ mod tests {
         let next = schedule.choose(&patches(3), placed(3), 64, &[Vec3::ZERO]);
         assert_eq!(next.len(), 1);
         assert_eq!(next[0].patch, PatchId(1));
+    }
+
+    #[test]
+    fn reflections_age_as_the_eye_moves() {
+        let metal = Lasting {
+            alpha: 0.1,
+            shine: 1.0,
+            ..MATTE
+        };
+        let mut schedule = Schedule::new(vec![MATTE, metal]);
+        let (before, after) = ([Vec3::ZERO], [Vec3::X * 0.1]);
+        for _ in 0..20 {
+            let jobs = schedule.choose(&patches(2), placed(2), u32::MAX, &before);
+            schedule.traced(&jobs, &[0.1; 2]);
+        }
+        let stale = |schedule: &Schedule, eyes| schedule.stale(&patches(2), placed(2), eyes);
+        assert!(stale(&schedule, &before).is_empty());
+        let jobs = stale(&schedule, &after);
+        assert_eq!(jobs.len(), 1);
+        assert_eq!(jobs[0].patch(), PatchId(1));
+        // There is time for one block: it is the one whose samples have aged.
+        let chosen = schedule.choose(&patches(2), placed(2), 64, &after);
+        assert_eq!(chosen[0].patch(), PatchId(1));
+        schedule.shown(&jobs);
+        assert!(stale(&schedule, &after).is_empty());
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! What a block holds is what its patch has there, however it lies.
 
+mod bent;
 mod samplers;
 
 use glam::{Affine2, Vec2, Vec3, Vec4, vec2};
@@ -97,6 +98,8 @@ fn placed(block: Block, old: Option<Block>) -> Placed {
     Placed {
         epoch: Epoch(1),
         reset: false,
+        out_of_memory: false,
+        visible: Vec::new(),
         removals: Vec::new(),
         placements: vec![Placement { patch, block }],
         moved: old.map(|old| (patch, old, block)).into_iter().collect(),
@@ -118,6 +121,7 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
         longest_history: 64.0,
         point: Vec3::ZERO,
         alpha: 1.0,
+        shine: 0.0,
     }]);
     let bytes = light.shown().size();
 

@@ -50,6 +50,11 @@ const MOVING_HISTORY: f32 = 8.0;
 // it is exposed.
 const BRIGHTEST_PATH: f32 = 1e18;
 
+// Brightness of a path, in that usual about it, which one sample may have.
+const OUTSHINING: f32 = 8.0;
+// Displayed brightness that is usual everywhere.
+const FAINT: f32 = 0.05;
+
 const TURNED: u32 = 1u << 14u;
 
 struct PatchPoint {
@@ -207,6 +212,31 @@ fn found_by(state: PathState) -> Found {
         select(0.0, 1.0, (state.progress & SUNLIT) != 0u));
 }
 
+// Samples that a texel's diffuse and glossy means run over when a path is added.
+fn histories_at(at: u32, block: BlockRecord, path: PathState, judgement: Judgement) -> vec2<f32> {
+    let moves = (path.progress & NEAR_MOVER) != 0u;
+    let longest = select(block.longest_history, min(block.longest_history, MOVING_HISTORY), moves);
+    return min(vec2<f32>(diffuse[at].w, glossy[at].w * block.glossy_keep), vec2<f32>(longest)) * judgement.kept;
+}
+
+// Of a path's light, what a mean of `samples` takes: no more than `OUTSHINING` times
+// what is usual there for each of its samples. A rare path that carries much light
+// comes in slowly, as others like it come, and not as a spot that stays; as samples
+// grow the limit does.
+// Related: Zirr et al., "Re-weighting Firefly Samples for Improved Finite-Sample
+// Monte Carlo Estimates", 2018.
+fn limited(light: vec3<f32>, usual: f32, samples: f32) -> vec3<f32> {
+    let most = OUTSHINING * (samples + 1.0) * max(usual, FAINT / max(parameters.exposure, 1e-30));
+    return light * select(1.0, min(most / max(luminance(light), 1e-30), 1.0), SMOOTHING);
+}
+
+// What a texel takes of what a path found. The block's texels share the excess: it is
+// spread out, not lost.
+fn accepted_at(at: u32, found: Found, histories: vec2<f32>, judgement: Judgement) -> Found {
+    let usual = max(judgement.usual, vec2<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb)));
+    return Found(limited(found.diffuse, usual.x, histories.x), limited(found.glossy, usual.y, histories.y), found.sun);
+}
+
 @compute @workgroup_size(64)
 fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
     let path = id.x + id.y * groups.x * 64u;
@@ -218,26 +248,25 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     // A coarse look is one sample, shared by the texels that it lights.
     let weight_of_sample = 1.0 / f32(job.stride * job.stride);
     let found = found_by(state);
-    add_to_cell(state.cell, found.diffuse);
-    let keep = kept[job.index];
-    var longest = job.block.longest_history;
-    if ((state.progress & NEAR_MOVER) != 0u) {
-        longest = min(longest, MOVING_HISTORY);
-    }
-    let of_diffuse = luminance(found.diffuse);
-    let of_glossy = luminance(found.glossy);
-    let found_moments = vec4<f32>(found.sun, of_diffuse * of_diffuse, of_glossy * of_glossy, 0.0);
+    let judgement = judgements[job.index];
+    let shared_out = Found(judgement.diffuse_excess, judgement.glossy_excess, 0.0);
+    add_to_cell(state.cell, limited(found.diffuse, judgement.usual.x, judgement.around));
     for (var y = 0u; y < min(job.stride, job.size.y - job.corner.y); y++) {
         for (var x = 0u; x < min(job.stride, job.size.x - job.corner.x); x++) {
             let at = ((job.block.position >> 16u) + job.corner.y + y) * parameters.atlas_width
                 + (job.block.position & 0xffffu) + job.corner.x + x;
-            let history = min(diffuse[at].w, longest) * keep.x;
-            let share = weight_of_sample / (history + weight_of_sample);
-            diffuse[at] = vec4<f32>(mix(diffuse[at].rgb, found.diffuse, share), history + weight_of_sample);
-            let glossy_history = min(glossy[at].w * job.block.glossy_keep, longest) * keep.y;
-            let glossy_share = weight_of_sample / (glossy_history + weight_of_sample);
-            glossy[at] = vec4<f32>(mix(glossy[at].rgb, found.glossy, glossy_share), glossy_history + weight_of_sample);
-            moments[at] = mix(moments[at], found_moments, vec4<f32>(share, share, glossy_share, 0.0));
+            let histories = histories_at(at, job.block, state, judgement);
+            let own = accepted_at(at, found, histories, judgement);
+            let others = accepted_at(at, shared_out, histories, judgement);
+            let light = own.diffuse + others.diffuse;
+            let glossy_light = own.glossy + others.glossy;
+            let shares = weight_of_sample / (histories + weight_of_sample);
+            diffuse[at] = vec4<f32>(mix(diffuse[at].rgb, light, shares.x), histories.x + weight_of_sample);
+            glossy[at] = vec4<f32>(mix(glossy[at].rgb, glossy_light, shares.y), histories.y + weight_of_sample);
+            let of_diffuse = luminance(light);
+            let of_glossy = luminance(glossy_light);
+            let found_moments = vec4<f32>(found.sun, of_diffuse * of_diffuse, of_glossy * of_glossy, 0.0);
+            moments[at] = mix(moments[at], found_moments, vec4<f32>(shares.xxy, 0.0));
         }
     }
 }

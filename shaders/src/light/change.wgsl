@@ -3,12 +3,24 @@
 // block can, and so a light that moves, dims or is hidden is followed at once while
 // what stands still keeps its history.
 // One workgroup per block; reads what its paths of this wave found and what its
-// texels remember, writes `kept`. Runs before `accumulate`.
+// texels remember, writes `judgements`. Runs before `accumulate`.
 // Related: Schied et al., "Gradient Estimation for Real-Time Adaptive Temporal
 // Filtering", 2018, which traces paths again to the same end.
 
-// Of each block: how much of its diffuse and of its glossy history holds.
-@group(2) @binding(8) var<storage, read_write> kept: array<vec2<f32>>;
+struct Judgement {
+    // How much of the block's diffuse and of its glossy history holds.
+    kept: vec2<f32>,
+    // Luminance that a diffuse and a glossy path usually bring here.
+    usual: vec2<f32>,
+    // What one path is short of by `limited`, on average over the wave's paths.
+    diffuse_excess: vec3<f32>,
+    // Paths that the cells about the block have heard of, on average.
+    around: f32,
+    glossy_excess: vec3<f32>,
+    padding: u32,
+}
+
+@group(2) @binding(8) var<storage, read_write> judgements: array<Judgement>;
 
 // Samples that a texel needs to have an opinion.
 const OPINION: f32 = 2.0;
@@ -28,9 +40,22 @@ struct Change {
     // Of the differences upwards: a path in a thousand that finds a lamp in a mirror
     // is no change, and is left out.
     largest: vec3<f32>,
+    // Without what the sun brings.
+    found: vec2<f32>,
+    brightest: vec2<f32>,
+    paths: f32,
+    // Light of the cells that the paths add to, and its paths.
+    around: vec2<f32>,
+}
+
+struct Excess {
+    diffuse: vec3<f32>,
+    glossy: vec3<f32>,
 }
 
 var<workgroup> changes: array<Change, 64>;
+var<workgroup> excesses: array<Excess, 64>;
+var<workgroup> judged: Judgement;
 
 @compute @workgroup_size(64)
 fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
@@ -44,18 +69,26 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if (index + 1u < parameters.block_count) {
         end = min(end, blocks[index + 1u].first_job);
     }
-    var change = Change(vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0), vec3<f32>(0.0));
-    for (var i = max(block.first_job, wave.first_job) + lane; i < end; i += 64u) {
+    let first = max(block.first_job, wave.first_job) + lane;
+    var change: Change;
+    for (var i = first; i < end; i += 64u) {
         let job = job_of(index, i);
         let at = ((block.position >> 16u) + job.corner.y) * parameters.atlas_width
             + (block.position & 0xffffu) + job.corner.x;
-        let found = found_by(paths[i - wave.first_job]);
+        let path = paths[i - wave.first_job];
+        let found = found_by(path);
         let samples = vec3<f32>(diffuse[at].w, glossy[at].w * block.glossy_keep, diffuse[at].w);
         let remembered = vec3<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb), moments[at].x);
         let squares = vec3<f32>(moments[at].yz, moments[at].x);
         let spread = max(squares - remembered * remembered, vec3<f32>(0.0));
         let has_opinion = select(vec3<f32>(0.0), vec3<f32>(1.0), samples >= vec3<f32>(OPINION));
-        let difference = vec3<f32>(luminance(found.diffuse), luminance(found.glossy), found.sun) - remembered;
+        let brightness = vec2<f32>(luminance(found.diffuse), luminance(found.glossy));
+        change.found += brightness;
+        change.brightest = max(change.brightest, brightness);
+        change.paths += 1.0;
+        let around = cell_light(path.cell);
+        change.around += vec2<f32>(luminance(around.rgb), around.w);
+        let difference = vec3<f32>(brightness, found.sun) - remembered;
         change.difference += difference * has_opinion;
         change.largest = max(change.largest, difference * has_opinion);
         change.variance += spread * (1.0 + 1.0 / max(samples, vec3<f32>(1.0))) * has_opinion;
@@ -63,19 +96,56 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     }
     changes[lane] = change;
     workgroupBarrier();
-    if (lane != 0u) {
-        return;
+    if (lane == 0u) {
+        for (var i = 1u; i < 64u; i++) {
+            change.difference += changes[i].difference;
+            change.variance += changes[i].variance;
+            change.remembered += changes[i].remembered;
+            change.largest = max(change.largest, changes[i].largest);
+            change.found += changes[i].found;
+            change.brightest = max(change.brightest, changes[i].brightest);
+            change.paths += changes[i].paths;
+            change.around += changes[i].around;
+        }
+        judged = judgement_of(change);
     }
-    for (var i = 1u; i < 64u; i++) {
-        change.difference += changes[i].difference;
-        change.variance += changes[i].variance;
-        change.remembered += changes[i].remembered;
-        change.largest = max(change.largest, changes[i].largest);
+    workgroupBarrier();
+    let judgement = judged;
+    var excess: Excess;
+    for (var i = first; SMOOTHING && i < end; i += 64u) {
+        let job = job_of(index, i);
+        let at = ((block.position >> 16u) + job.corner.y) * parameters.atlas_width
+            + (block.position & 0xffffu) + job.corner.x;
+        let path = paths[i - wave.first_job];
+        let found = found_by(path);
+        let accepted = accepted_at(at, found, histories_at(at, block, path, judgement), judgement);
+        excess.diffuse += found.diffuse - accepted.diffuse;
+        excess.glossy += found.glossy - accepted.glossy;
     }
-    change.difference -= change.largest;
-    let least = NO_CHANGE * max(change.remembered, abs(change.difference));
+    excesses[lane] = excess;
+    workgroupBarrier();
+    if (lane == 0u) {
+        for (var i = 1u; i < 64u; i++) {
+            excess.diffuse += excesses[i].diffuse;
+            excess.glossy += excesses[i].glossy;
+        }
+        judged.diffuse_excess = excess.diffuse / max(change.paths, 1.0);
+        judged.glossy_excess = excess.glossy / max(change.paths, 1.0);
+        judgements[index] = judged;
+    }
+}
+
+fn judgement_of(of_all: Change) -> Judgement {
+    let difference = of_all.difference - of_all.largest;
+    let least = NO_CHANGE * max(of_all.remembered, abs(difference));
     // Ratios of roots: squares of the brightest light leave the range of f32.
-    let surprise = abs(change.difference) / max(sqrt(change.variance) + least, vec3<f32>(1e-18));
+    let surprise = abs(difference) / max(sqrt(of_all.variance) + least, vec3<f32>(1e-18));
     let keep = clamp(CHANGED / max(surprise * surprise, vec3<f32>(1e-6)), vec3<f32>(LEAST_KEPT), vec3<f32>(1.0));
-    kept[index] = vec2<f32>(min(keep.x, keep.z), keep.y);
+    var judgement: Judgement;
+    judgement.kept = vec2<f32>(min(keep.x, keep.z), keep.y);
+    // Without the brightest path: it is the one in question.
+    judgement.usual = max(of_all.found - of_all.brightest, vec2<f32>(0.0)) / max(of_all.paths - 1.0, 1.0);
+    judgement.usual.x = max(judgement.usual.x, of_all.around.x / max(of_all.around.y, 1.0));
+    judgement.around = of_all.around.y / max(of_all.paths, 1.0);
+    return judgement;
 }

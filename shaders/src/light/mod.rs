@@ -54,5 +54,7 @@ pub const STILL_SOURCE: &str = path_source!("still.wgsl");
 pub const CELL_COUNT: u32 = 1 << 17;
 /// Bytes of each.
 pub const CELL_BYTES: u64 = 24;
+/// Bytes of what is judged of a block.
+pub const JUDGEMENT_BYTES: u64 = 48;
 /// Kernel `carry_blocks`.
 pub const CARRY_SOURCE: &str = include_str!("carry.wgsl");

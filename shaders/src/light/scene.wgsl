@@ -240,6 +240,12 @@ const ROUNDING: f32 = 1.1920929e-7;
 // Smallest GGX alpha: below it the lobe's peak leaves the range in which f32 keeps its shape.
 const MIN_ALPHA: f32 = 0.001;
 
+// A shading normal that faces away from the viewer, bent until it does not.
+fn facing(n: vec3<f32>, wo: vec3<f32>) -> vec3<f32> {
+    let cos_o = dot(n, wo);
+    return normalize(n + wo * max(0.01 - cos_o, 0.0));
+}
+
 // `b` are the barycentric weights of corners 1 and 2; `width` is the sample's
 // width in metres.
 fn surface_at(triangle: u32, b: vec2<f32>, wo: vec3<f32>, width: f32) -> Surface {
@@ -314,13 +320,8 @@ fn surface_at(triangle: u32, b: vec2<f32>, wo: vec3<f32>, width: f32) -> Surface
             s.emissive = vec3<f32>(0.0);
         }
     }
-    // A shading normal that faces away from the viewer is bent until it does not.
-    let facing = dot(ns, wo);
-    if (facing < 0.01) {
-        ns = normalize(ns + wo * (0.01 - facing));
-    }
     s.ng = ng;
-    s.ns = ns;
+    s.ns = facing(ns, wo);
     s.base = color.rgb;
     let alpha = clamp(roughness, 0.0, 1.0);
     s.alpha = max(alpha * alpha, MIN_ALPHA);

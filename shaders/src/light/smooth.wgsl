@@ -28,6 +28,11 @@ const LEAST_GLOSSY_NOISE: f32 = 0.5;
 // and less that it does not know itself, and are wider than its window.
 const SURROUNDED_SAMPLES: f32 = 4.5;
 
+// Turn of the normal, in GGX alphas, that one look at the sun's reflection covers,
+// and looks along a texel's side at most.
+const LOBE_LOOK: f32 = 0.5;
+const MOST_LOOKS: f32 = 4.0;
+
 // Variance of a mean of `samples` samples with this mean square.
 fn variance_of(mean: f32, mean_square: f32, samples: f32) -> f32 {
     let measured = max(mean_square - mean * mean, 0.0);
@@ -48,12 +53,50 @@ fn likeness(difference: f32, variance: f32) -> f32 {
     return exp(-difference * difference / (TOLERANCE * TOLERANCE * max(variance, 1e-8)));
 }
 
-// The sun by both lobes, where all of it is seen. A lobe narrower than the sun
-// shows the sun's disc.
-fn sunlight(s_in: Surface, wo: vec3<f32>) -> vec3<f32> {
-    var s = s_in;
+// The interpolated vertex normal of a block's surface at `p`, from 0 to 1 along the
+// block's sides, on the side of `wo`.
+fn vertex_normal_at(block: BlockRecord, p: vec2<f32>, ng: vec3<f32>) -> vec3<f32> {
+    let point = block_point(block.layout_bits, p);
+    let record = triangles[block.first_triangle + point.triangle];
+    var n = corners[record.x * 3u].xyz * (1.0 - point.b.x - point.b.y) + corners[record.y * 3u].xyz * point.b.x
+        + corners[record.z * 3u].xyz * point.b.y;
+    let instance = block.layout_bits >> 16u;
+    if (HAS_MOVERS && instance != 0u) {
+        n = transform_vector(instances[instance].world_from_object, n);
+    }
+    return select(-n, n, dot(n, ng) >= 0.0);
+}
+
+// The sun by both lobes, where all of it is seen, as the mean over the texel at `p`:
+// on a bent surface a highlight narrower than a texel would flare or be missed. A
+// lobe narrower than the sun shows the sun's disc.
+fn sunlight(block: BlockRecord, seen: Seen, p: vec2<f32>, size: vec2<f32>) -> vec3<f32> {
+    var s = seen.surface;
     s.alpha = max(s.alpha, sqrt(max(2.0 - 2.0 * globals.sun_cos, 0.0)));
-    return both_lobes(s, evaluate_bsdf(s, wo, globals.sun_direction)) * globals.sun_irradiance;
+    // What lies beyond the patch is not the texel's.
+    let low = max(p - 0.5, vec2<f32>(0.0)) / (size - 1.0);
+    let high = min(p + 0.5, size - 1.0) / (size - 1.0);
+    let corner = vertex_normal_at(block, low, s.ng);
+    let turns = vec2<f32>(
+        length(vertex_normal_at(block, vec2<f32>(high.x, low.y), s.ng) - corner),
+        length(vertex_normal_at(block, vec2<f32>(low.x, high.y), s.ng) - corner));
+    let looks = vec2<i32>(clamp(ceil(turns / (LOBE_LOOK * s.alpha)), vec2<f32>(1.0), vec2<f32>(MOST_LOOKS)));
+    if (all(looks == vec2<i32>(1))) {
+        return both_lobes(s, evaluate_bsdf(s, seen.wo, globals.sun_direction)) * globals.sun_irradiance;
+    }
+    // What one look covers widens its lobe: Tokuyoshi and Kaplanyan, "Improved
+    // Geometric Specular Antialiasing", 2019, section 3.
+    let covered = turns / vec2<f32>(looks);
+    s.alpha = min(sqrt(s.alpha * s.alpha + dot(covered, covered) / 6.0), 1.0);
+    let middle = vertex_normal_at(block, p / (size - 1.0), s.ng);
+    let mapped = select(s.ns - normalize(middle), vec3<f32>(0.0), dot(middle, seen.wo) < 0.01);
+    var sum = vec3<f32>(0.0);
+    for (var i = 0; i < looks.x * looks.y; i++) {
+        let inside = (vec2<f32>(vec2<i32>(i % looks.x, i / looks.x)) + 0.5) / vec2<f32>(looks);
+        s.ns = facing(normalize(vertex_normal_at(block, mix(low, high, inside), s.ng)) + mapped, seen.wo);
+        sum += both_lobes(s, evaluate_bsdf(s, seen.wo, globals.sun_direction));
+    }
+    return sum / f32(looks.x * looks.y) * globals.sun_irradiance;
 }
 
 @compute @workgroup_size(64)
@@ -116,7 +159,7 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
         var light = s.emissive + diffuse_color(s) * diffuse_light + glossy_light;
         if (HAS_SUN) {
-            light += moments[at].x * sunlight(s, seen.wo);
+            light += moments[at].x * sunlight(block, seen, vec2<f32>(p), vec2<f32>(size));
         }
         shown[at] = vec4<f32>(sound(light), here.w);
     }

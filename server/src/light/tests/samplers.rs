@@ -7,6 +7,7 @@ mod bsdf;
 mod lamps;
 mod points;
 mod shapes;
+mod sky;
 
 use bytemuck::Pod;
 use shadecast_shaders::light::ADVANCE_SOURCE;
