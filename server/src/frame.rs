@@ -3,10 +3,10 @@
 //!
 //! Source: SAS 2018, section 3 and figure 2.
 
-use std::time::Duration;
+use std::{collections::BTreeMap, time::Duration};
 
 use glam::Vec3;
-use shadecast_protocol::{FrameId, Motion, Picture, Pose, Update, UpdateTiming};
+use shadecast_protocol::{FrameId, Motion, PatchId, Picture, Pose, Update, UpdateTiming};
 
 use crate::{
     atlas::{Atlas, AtlasError, AtlasShape, AtlasStats, Footprints},
@@ -250,37 +250,49 @@ impl Pipeline {
         let news = self.known.news(&self.scene, &placed.placements, &motions);
         stages.atlas = lap();
 
-        let lit = (placed.visible.iter())
+        let visible = (placed.visible.iter())
             .filter_map(|visible| Some((visible.patch, visible.block?, visible.pixels)));
-        let jobs = self
-            .schedule
-            .choose(&self.scene.patches, lit.clone(), order.paths, &eyes);
         let mut encoder = self
             .gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.light.record_moves(&self.gpu, &mut encoder, &placed)?;
         self.gpu.queue.submit([encoder.finish()]);
-        let mut unlit: Vec<Job> = (placed.placements.iter())
-            .map(|placed| {
-                self.schedule
-                    .job(&self.scene.patches, placed.patch, placed.block, &eyes)
-            })
-            .collect();
-        self.schedule.shown(&unlit);
-        if self.has_sun {
-            unlit.extend(self.schedule.stale(&self.scene.patches, lit, &eyes));
-            self.schedule.shown(&unlit);
-        }
         let viewer = Viewer {
             eye,
             pixels_per_radian,
             exposure: self.exposure,
         };
-        let noise = self
-            .light
-            .trace(&self.gpu, &self.gpu_scene, &jobs, &unlit, viewer)?;
-        self.schedule.traced(&jobs, &noise);
+        let patches = &self.scene.patches;
+        let mut lit: BTreeMap<PatchId, Job> = BTreeMap::new();
+        let mut paths = 0;
+        for _ in 0..MOST_ROUNDS {
+            let left = order.paths.saturating_sub(paths);
+            let jobs = self.schedule.choose(patches, visible.clone(), left, &eyes);
+            self.light.trace(&self.gpu, &self.gpu_scene, &jobs, viewer);
+            self.schedule.traced(&jobs);
+            let traced: u32 = jobs.iter().map(Job::paths).sum();
+            paths += traced;
+            lit.extend(jobs.into_iter().map(|job| (job.patch(), job)));
+            if traced == 0 || order.paths.saturating_sub(paths) <= order.paths / LAST_ROUND {
+                break;
+            }
+        }
+        let mut unlit: BTreeMap<PatchId, Job> = BTreeMap::new();
+        for placed in &placed.placements {
+            let job = (self.schedule).job(patches, placed.patch, placed.block, &eyes);
+            unlit.insert(placed.patch, job);
+        }
+        if self.has_sun {
+            let stale = self.schedule.stale(patches, visible, &eyes);
+            unlit.extend(stale.into_iter().map(|job| (job.patch(), job)));
+        }
+        unlit.retain(|patch, _| !lit.contains_key(patch));
+        let lit: Vec<Job> = lit.into_values().collect();
+        let unlit: Vec<Job> = unlit.into_values().collect();
+        let noise = (self.light).show(&self.gpu, &self.gpu_scene, &lit, &unlit, viewer)?;
+        self.schedule.measured(&lit, &noise);
+        self.schedule.shown(&unlit);
         stages.light = lap();
 
         let mut encoder = self
@@ -321,11 +333,17 @@ impl Pipeline {
                 unplaced: placed.unplaced,
                 bias: placed.bias,
                 atlas: placed.stats,
-                paths: jobs.iter().map(Job::paths).sum(),
+                paths,
             },
         })
     }
 }
+
+/// What is left of a frame's paths after a round is spent on another while it is more
+/// than this fraction of them: a block takes one path a texel in a round.
+const LAST_ROUND: u32 = 8;
+/// Rounds of a frame: more of them than this are for hardly any texels.
+const MOST_ROUNDS: u32 = 16;
 
 /// Share of the light that the glossy lobe of a dielectric carries.
 const LEAST_SHINE: f32 = 0.1;

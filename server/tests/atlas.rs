@@ -54,6 +54,11 @@ fn pipeline(scene: &Scene) -> (Pipeline, Arc<Mutex<Vec<u8>>>) {
 
 /// The frame of a head that has turned by so many radians.
 fn frame(pipeline: &mut Pipeline, id: u32, turned: f32, reset: bool) -> Frame {
+    lit_frame(pipeline, id, turned, reset, 100_000)
+}
+
+/// The same with a budget of paths.
+fn lit_frame(pipeline: &mut Pipeline, id: u32, turned: f32, reset: bool, paths: u32) -> Frame {
     let eye = EyeView {
         head_from_eye: Pose::IDENTITY,
         fov: Fov::symmetric(1.0),
@@ -77,7 +82,7 @@ fn frame(pipeline: &mut Pipeline, id: u32, turned: f32, reset: bool) -> Frame {
         prediction: Prediction::linear(&view, Duration::ZERO, 1),
         scene_time: Duration::ZERO,
         objects_lead: Duration::ZERO,
-        paths: 100_000,
+        paths,
         reset,
         new_client: id == 0,
         timing: UpdateTiming::default(),
@@ -135,4 +140,21 @@ fn the_same_orders_make_the_same_updates() {
             .iter()
             .any(|(update, ..)| !update.removals.is_empty())
     );
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_budget_beyond_a_path_a_texel_is_spent_too() {
+    let (mut pipeline, _) = pipeline(&courtyard(3_000));
+    let budget = 400_000;
+    let first = lit_frame(&mut pipeline, 0, 0.0, true, budget);
+    let placements = first.update.placements.iter();
+    let texels: u32 = placements
+        .map(|placement| {
+            let (width, height) = placement.block.level.size();
+            width * height
+        })
+        .sum();
+    assert!(texels < budget / 2, "{texels}");
+    assert!(first.stats.paths > budget / 8 * 7, "{}", first.stats.paths);
 }

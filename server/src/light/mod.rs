@@ -12,10 +12,8 @@ mod schedule;
 #[cfg(test)]
 mod tests;
 
-use std::collections::HashSet;
-
 use glam::Vec3;
-use shadecast_protocol::{Block, PatchId};
+use shadecast_protocol::Block;
 use shadecast_shaders::light::{
     ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CELL_BYTES, CELL_COUNT, CarryParameters,
     JUDGEMENT_BYTES, LightParameters, Move, NO_BLOCK,
@@ -279,51 +277,15 @@ impl Light {
         Ok(())
     }
 
-    /// Traces the paths of `jobs`, smooths what they and the moves changed, given
-    /// as jobs that are not traced, and tells how noisy each job's block still is.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn trace(
-        &self,
-        gpu: &Gpu,
-        gpu_scene: &GpuScene,
-        jobs: &[Job],
-        moved: &[Job],
-        viewer: Viewer,
-    ) -> Result<Vec<f32>, GpuError> {
-        let most = (self.blocks.size() / size_of::<BlockRecord>() as u64) as usize;
-        let mut records = Vec::with_capacity(most.min(jobs.len() + moved.len()));
+    /// Traces the paths of `jobs`, at most one a block.
+    pub fn trace(&self, gpu: &Gpu, gpu_scene: &GpuScene, jobs: &[Job], viewer: Viewer) {
+        let mut records = Vec::with_capacity(jobs.len());
         let mut path_count = 0;
-        for job in jobs.iter().take(most) {
+        for job in jobs.iter().take(self.most_blocks()) {
             records.push(job.record(path_count));
             path_count += job.paths();
         }
-        let lit = records.len();
-        let lit_patches: HashSet<PatchId> = jobs.iter().map(Job::patch).collect();
-        let only_moved = moved
-            .iter()
-            .filter(|job| !lit_patches.contains(&job.patch()));
-        records.extend(
-            only_moved
-                .take(most - lit)
-                .map(|job| job.record(path_count)),
-        );
-        if records.is_empty() {
-            return Ok(Vec::new());
-        }
-        let parameters = LightParameters {
-            eye: viewer.eye.to_array(),
-            block_count: records.len() as u32,
-            atlas_width: self.atlas_width,
-            seed: 0,
-            pixel_angle: 1.0 / viewer.pixels_per_radian,
-            exposure: viewer.exposure,
-        };
-        gpu.queue
-            .write_buffer(&self.parameters, 0, bytemuck::bytes_of(&parameters));
-        gpu.queue
-            .write_buffer(&self.blocks, 0, bytemuck::cast_slice(&records));
+        self.set_blocks(gpu, &records, viewer);
         let ends = Ends {
             start: &self.start,
             before_finish: Some((&self.change, records.len() as u32)),
@@ -332,7 +294,28 @@ impl Light {
             from_camera: false,
         };
         self.paths.follow(gpu, gpu_scene, ends, path_count);
+    }
 
+    /// Makes what is shown of the blocks of `lit`, which were traced, and of `unlit`,
+    /// and tells how noisy each of the former still is. No block is in both.
+    ///
+    /// # Errors
+    /// When the driver fails.
+    pub fn show(
+        &self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        lit: &[Job],
+        unlit: &[Job],
+        viewer: Viewer,
+    ) -> Result<Vec<f32>, GpuError> {
+        let jobs = lit.iter().chain(unlit).take(self.most_blocks());
+        let records: Vec<BlockRecord> = jobs.map(|job| job.record(0)).collect();
+        let lit = lit.len().min(records.len());
+        if records.is_empty() {
+            return Ok(Vec::new());
+        }
+        self.set_blocks(gpu, &records, viewer);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -360,6 +343,25 @@ impl Light {
         gpu.submit_and_read(encoder, &self.noise_readback, bytes, |bytes| {
             bytemuck::cast_slice(bytes).to_vec()
         })
+    }
+
+    fn most_blocks(&self) -> usize {
+        (self.blocks.size() / size_of::<BlockRecord>() as u64) as usize
+    }
+
+    fn set_blocks(&self, gpu: &Gpu, records: &[BlockRecord], viewer: Viewer) {
+        let parameters = LightParameters {
+            eye: viewer.eye.to_array(),
+            block_count: records.len() as u32,
+            atlas_width: self.atlas_width,
+            seed: 0,
+            pixel_angle: 1.0 / viewer.pixels_per_radian,
+            exposure: viewer.exposure,
+        };
+        gpu.queue
+            .write_buffer(&self.parameters, 0, bytemuck::bytes_of(&parameters));
+        gpu.queue
+            .write_buffer(&self.blocks, 0, bytemuck::cast_slice(records));
     }
 }
 

@@ -282,18 +282,27 @@ impl Schedule {
         }
     }
 
-    /// Notes that `jobs` were traced and how noisy each block is now.
-    pub fn traced(&mut self, jobs: &[Job], noise: &[f32]) {
-        for (job, &noise) in jobs.iter().zip(noise) {
+    /// Notes that `jobs` were traced: until it is measured, their noise falls as
+    /// that of means does.
+    pub fn traced(&mut self, jobs: &[Job]) {
+        for job in jobs {
             let lit = &mut self.lit[job.patch.0 as usize];
             lit.drawn = lit.drawn.wrapping_add(1);
             let weight = 0.25_f32.powi(job.log2_stride as i32);
-            lit.worth = lit.worth.min(job.longest_history) + weight;
+            let before = lit.worth.min(job.longest_history);
+            lit.worth = before + weight;
+            lit.noise *= (before / lit.worth).sqrt();
             lit.glossy_worth =
                 (lit.glossy_worth * job.glossy_keep).min(job.longest_history) + weight;
-            lit.noise = if noise.is_finite() { noise } else { 0.0 };
             lit.view = job.view;
             lit.shown_from = job.view;
+        }
+    }
+
+    /// Notes how noisy the blocks of `jobs` were found to be.
+    pub fn measured(&mut self, jobs: &[Job], noise: &[f32]) {
+        for (job, &noise) in jobs.iter().zip(noise) {
+            self.lit[job.patch.0 as usize].noise = if noise.is_finite() { noise } else { 0.0 };
         }
     }
 }
@@ -356,7 +365,8 @@ mod tests {
         let mut schedule = Schedule::new(vec![MATTE; 3]);
         let first = schedule.choose(&patches(3), placed(3), u32::MAX, &[Vec3::ZERO]);
         for _ in 0..20 {
-            schedule.traced(&first, &[0.01, 0.5, 0.01]);
+            schedule.traced(&first);
+            schedule.measured(&first, &[0.01, 0.5, 0.01]);
         }
         let next = schedule.choose(&patches(3), placed(3), 64, &[Vec3::ZERO]);
         assert_eq!(next.len(), 1);
@@ -374,7 +384,8 @@ mod tests {
         let (before, after) = ([Vec3::ZERO], [Vec3::X * 0.1]);
         for _ in 0..20 {
             let jobs = schedule.choose(&patches(2), placed(2), u32::MAX, &before);
-            schedule.traced(&jobs, &[0.1; 2]);
+            schedule.traced(&jobs);
+            schedule.measured(&jobs, &[0.1; 2]);
         }
         let stale = |schedule: &Schedule, eyes| schedule.stale(&patches(2), placed(2), eyes);
         assert!(stale(&schedule, &before).is_empty());
@@ -411,7 +422,8 @@ mod tests {
     fn a_block_that_lost_its_content_is_a_first_look_again() {
         let mut schedule = Schedule::new(vec![MATTE; 2]);
         let first = schedule.choose(&patches(2), placed(2), u32::MAX, &[Vec3::ZERO]);
-        schedule.traced(&first, &[f32::NAN, 0.1]);
+        schedule.traced(&first);
+        schedule.measured(&first, &[f32::NAN, 0.1]);
         schedule.placed(PatchId(1), false, false);
         let next = schedule.choose(&patches(2), placed(2), 0, &[Vec3::ZERO]);
         assert_eq!(

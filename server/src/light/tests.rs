@@ -141,9 +141,11 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
         gpu.queue.submit([encoder.finish()]);
         // Only the first block is traced; the others are resampled from it.
         let job = [schedule.job(&scene.patches, PatchId(0), block, &[EYE])];
-        let jobs = if old.is_none() { &job[..] } else { &[] };
+        if old.is_none() {
+            light.trace(&gpu, &gpu_scene, &job, VIEWER);
+        }
         light
-            .trace(&gpu, &gpu_scene, jobs, &job, VIEWER)
+            .show(&gpu, &gpu_scene, &[], &job, VIEWER)
             .expect("light");
         let shown: Vec<Vec4> = gpu
             .read(light.shown(), 0..bytes)

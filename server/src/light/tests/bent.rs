@@ -68,8 +68,10 @@ fn shown_mean(scene: &PatchedScene, width: u8, height: u8) -> f32 {
         .expect("room");
     gpu.queue.submit([encoder.finish()]);
     let job = [schedule.job(&scene.patches, PatchId(0), block, &[EYE])];
+    let viewer = Viewer { eye: EYE, ..VIEWER };
+    light.trace(&gpu, &gpu_scene, &job, viewer);
     light
-        .trace(&gpu, &gpu_scene, &job, &job, Viewer { eye: EYE, ..VIEWER })
+        .show(&gpu, &gpu_scene, &job, &[], viewer)
         .expect("light");
     let shown: Vec<Vec4> = gpu
         .read(light.shown(), 0..light.shown().size())
