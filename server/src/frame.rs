@@ -9,7 +9,7 @@ use glam::Vec3;
 use shadecast_protocol::{FrameId, Motion, PatchId, Picture, Pose, Update, UpdateTiming};
 
 use crate::{
-    atlas::{Atlas, AtlasError, AtlasShape, AtlasStats, Footprints},
+    atlas::{Atlas, AtlasError, AtlasShape, AtlasStats, Footprints, Placed},
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
@@ -250,8 +250,6 @@ impl Pipeline {
         let news = self.known.news(&self.scene, &placed.placements, &motions);
         stages.atlas = lap();
 
-        let visible = (placed.visible.iter())
-            .filter_map(|visible| Some((visible.patch, visible.block?, visible.pixels)));
         let mut encoder = self
             .gpu
             .device
@@ -263,36 +261,7 @@ impl Pipeline {
             pixels_per_radian,
             exposure: self.exposure,
         };
-        let patches = &self.scene.patches;
-        let mut lit: BTreeMap<PatchId, Job> = BTreeMap::new();
-        let mut paths = 0;
-        for _ in 0..MOST_ROUNDS {
-            let left = order.paths.saturating_sub(paths);
-            let jobs = self.schedule.choose(patches, visible.clone(), left, &eyes);
-            self.light.trace(&self.gpu, &self.gpu_scene, &jobs, viewer);
-            self.schedule.traced(&jobs);
-            let traced: u32 = jobs.iter().map(Job::paths).sum();
-            paths += traced;
-            lit.extend(jobs.into_iter().map(|job| (job.patch(), job)));
-            if traced == 0 || order.paths.saturating_sub(paths) <= order.paths / LAST_ROUND {
-                break;
-            }
-        }
-        let mut unlit: BTreeMap<PatchId, Job> = BTreeMap::new();
-        for placed in &placed.placements {
-            let job = (self.schedule).job(patches, placed.patch, placed.block, &eyes);
-            unlit.insert(placed.patch, job);
-        }
-        if self.has_sun {
-            let stale = self.schedule.stale(patches, visible, &eyes);
-            unlit.extend(stale.into_iter().map(|job| (job.patch(), job)));
-        }
-        unlit.retain(|patch, _| !lit.contains_key(patch));
-        let lit: Vec<Job> = lit.into_values().collect();
-        let unlit: Vec<Job> = unlit.into_values().collect();
-        let noise = (self.light).show(&self.gpu, &self.gpu_scene, &lit, &unlit, viewer)?;
-        self.schedule.measured(&lit, &noise);
-        self.schedule.shown(&unlit);
+        let paths = self.light(order.paths, &placed, &eyes, viewer)?;
         stages.light = lap();
 
         let mut encoder = self
@@ -336,6 +305,50 @@ impl Pipeline {
                 paths,
             },
         })
+    }
+
+    /// Lights what is placed with about `budget` paths, makes it to be shown, and
+    /// tells how many paths it took; `eyes[n]` is the eye in the space of `ObjectId(n)`.
+    fn light(
+        &mut self,
+        budget: u32,
+        placed: &Placed,
+        eyes: &[Vec3],
+        viewer: Viewer,
+    ) -> Result<u32, GpuError> {
+        let visible = (placed.visible.iter())
+            .filter_map(|visible| Some((visible.patch, visible.block?, visible.pixels)));
+        let patches = &self.scene.patches;
+        let mut lit: BTreeMap<PatchId, Job> = BTreeMap::new();
+        let mut paths = 0;
+        for _ in 0..MOST_ROUNDS {
+            let left = budget.saturating_sub(paths);
+            let jobs = self.schedule.choose(patches, visible.clone(), left, eyes);
+            self.light.trace(&self.gpu, &self.gpu_scene, &jobs, viewer);
+            self.schedule.traced(&jobs);
+            let traced: u32 = jobs.iter().map(Job::paths).sum();
+            paths += traced;
+            lit.extend(jobs.into_iter().map(|job| (job.patch(), job)));
+            if traced == 0 || budget.saturating_sub(paths) <= budget / LAST_ROUND {
+                break;
+            }
+        }
+        let mut unlit: BTreeMap<PatchId, Job> = BTreeMap::new();
+        for placed in &placed.placements {
+            let job = (self.schedule).job(patches, placed.patch, placed.block, eyes);
+            unlit.insert(placed.patch, job);
+        }
+        if self.has_sun {
+            let stale = self.schedule.stale(patches, visible, eyes);
+            unlit.extend(stale.into_iter().map(|job| (job.patch(), job)));
+        }
+        unlit.retain(|patch, _| !lit.contains_key(patch));
+        let lit: Vec<Job> = lit.into_values().collect();
+        let unlit: Vec<Job> = unlit.into_values().collect();
+        let noise = (self.light).show(&self.gpu, &self.gpu_scene, &lit, &unlit, viewer)?;
+        self.schedule.measured(&lit, &noise);
+        self.schedule.shown(&unlit);
+        Ok(paths)
     }
 }
 

@@ -8,6 +8,7 @@
 //! have (masks, moving objects, a sky, a lens) is not built, bound or drawn.
 
 mod atlas;
+mod backdrop;
 mod cover;
 mod eyes;
 #[cfg(feature = "vulkan")]

@@ -9,8 +9,7 @@ use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
 use glam::{Mat4, Quat, Vec3};
 use shadecast_protocol::Pose;
 
-use super::EyeCamera;
-use super::pipelines::Pipelines;
+use super::{EyeCamera, backdrop, pipelines::Pipelines};
 
 /// Pixels of a line of text; at the panel's scale its letters are 1.5° high.
 const LINE: f32 = 44.0;
@@ -55,57 +54,13 @@ impl NoticePass {
         before: Option<&Self>,
     ) -> Self {
         let picture = Picture::of(text);
-        let format = if eye_format.is_srgb() {
-            wgpu::TextureFormat::Rgba8UnormSrgb
-        } else {
-            wgpu::TextureFormat::Rgba8Unorm
-        };
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("notice"),
-            size: wgpu::Extent3d {
-                width: picture.width,
-                height: picture.height,
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
-        queue.write_texture(
-            texture.as_image_copy(),
-            &picture.rgba,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(picture.width * 4),
-                rows_per_image: None,
-            },
-            texture.size(),
-        );
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("notice"),
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..wgpu::SamplerDescriptor::default()
-        });
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("notice"),
-            layout: &pipelines.layouts().notice,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 4,
-                    resource: wgpu::BindingResource::TextureView(
-                        &texture.create_view(&wgpu::TextureViewDescriptor::default()),
-                    ),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 5,
-                    resource: wgpu::BindingResource::Sampler(&sampler),
-                },
-            ],
-        });
+        let group = backdrop::Picture {
+            label: "notice",
+            size: [picture.width, picture.height],
+            rgba: &picture.rgba,
+            sideways: wgpu::AddressMode::ClampToEdge,
+        }
+        .bind(device, queue, eye_format, &pipelines.layouts().notice, 4);
         Self {
             text: text.to_owned(),
             pipeline: pipelines.build_notice(device),

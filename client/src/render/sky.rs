@@ -2,7 +2,7 @@
 
 use shadecast_protocol::Sky;
 
-use super::pipelines::Pipelines;
+use super::{backdrop, pipelines::Pipelines};
 
 /// A sky picture that is drawn behind everything.
 #[derive(Debug)]
@@ -24,65 +24,20 @@ impl SkyPass {
         if pixels == 0 || sky.rgb.len() != pixels * 3 {
             return None;
         }
-        // Like the atlas, it holds display-encoded colours.
-        let format = if eye_format.is_srgb() {
-            wgpu::TextureFormat::Rgba8UnormSrgb
-        } else {
-            wgpu::TextureFormat::Rgba8Unorm
-        };
-        let texture = device.create_texture(&wgpu::TextureDescriptor {
-            label: Some("sky"),
-            size: wgpu::Extent3d {
-                width: sky.width.into(),
-                height: sky.height.into(),
-                depth_or_array_layers: 1,
-            },
-            mip_level_count: 1,
-            sample_count: 1,
-            dimension: wgpu::TextureDimension::D2,
-            format,
-            usage: wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::TEXTURE_BINDING,
-            view_formats: &[],
-        });
         let rgba: Vec<u8> = sky
             .rgb
             .chunks_exact(3)
             .flat_map(|pixel| [pixel[0], pixel[1], pixel[2], 255])
             .collect();
-        queue.write_texture(
-            texture.as_image_copy(),
-            &rgba,
-            wgpu::TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(u32::from(sky.width) * 4),
-                rows_per_image: None,
-            },
-            texture.size(),
-        );
-        // Columns go round, rows end at the poles.
-        let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("sky"),
-            address_mode_u: wgpu::AddressMode::Repeat,
-            mag_filter: wgpu::FilterMode::Linear,
-            min_filter: wgpu::FilterMode::Linear,
-            ..wgpu::SamplerDescriptor::default()
-        });
-        let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
-            label: Some("sky"),
-            layout: &pipelines.layouts().sky,
-            entries: &[
-                wgpu::BindGroupEntry {
-                    binding: 2,
-                    resource: wgpu::BindingResource::TextureView(
-                        &texture.create_view(&wgpu::TextureViewDescriptor::default()),
-                    ),
-                },
-                wgpu::BindGroupEntry {
-                    binding: 3,
-                    resource: wgpu::BindingResource::Sampler(&sampler),
-                },
-            ],
-        });
+        let picture = backdrop::Picture {
+            label: "sky",
+            size: [sky.width.into(), sky.height.into()],
+            rgba: &rgba,
+            // Columns go round, rows end at the poles.
+            sideways: wgpu::AddressMode::Repeat,
+        };
+        let layout = &pipelines.layouts().sky;
+        let group = picture.bind(device, queue, eye_format, layout, 2);
         Some(Self {
             pipeline: pipelines.build_sky(device),
             group,

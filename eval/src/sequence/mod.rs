@@ -5,8 +5,8 @@
 //! remembers pixels, ours remembers surfaces. How much work fits the time is
 //! measured beforehand, so that a run can be repeated; what the updates took is
 //! measured besides. On a software driver time is that of the CPU: it is the device,
-//! and whatever else runs on it must not count. Neither network nor video is in the way: what is compared is
-//! light.
+//! and whatever else runs on it must not count. Neither network nor video is in the
+//! way: what is compared is light.
 
 mod contenders;
 mod moments;

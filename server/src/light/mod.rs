@@ -277,7 +277,8 @@ impl Light {
         Ok(())
     }
 
-    /// Traces the paths of `jobs`, at most one a block.
+    /// Traces the paths of `jobs`, of which a block has one at most: a texel takes its
+    /// paths one after the other.
     pub fn trace(&self, gpu: &Gpu, gpu_scene: &GpuScene, jobs: &[Job], viewer: Viewer) {
         let mut records = Vec::with_capacity(jobs.len());
         let mut path_count = 0;
