@@ -324,9 +324,13 @@ impl Pipeline {
         for _ in 0..MOST_ROUNDS {
             let left = budget.saturating_sub(paths);
             let jobs = self.schedule.choose(patches, visible.clone(), left, eyes);
+            let traced: u32 = jobs.iter().map(Job::paths).sum();
+            // A block larger than its budget gets its turn in the first round only.
+            if paths > 0 && traced > left {
+                break;
+            }
             self.light.trace(&self.gpu, &self.gpu_scene, &jobs, viewer);
             self.schedule.traced(&jobs);
-            let traced: u32 = jobs.iter().map(Job::paths).sum();
             paths += traced;
             lit.extend(jobs.into_iter().map(|job| (job.patch(), job)));
             if traced == 0 || budget.saturating_sub(paths) <= budget / LAST_ROUND {
@@ -358,9 +362,6 @@ const LAST_ROUND: u32 = 8;
 /// Rounds of a frame: more of them than this are for hardly any texels.
 const MOST_ROUNDS: u32 = 16;
 
-/// Share of the light that the glossy lobe of a dielectric carries.
-const LEAST_SHINE: f32 = 0.1;
-
 /// What a patch's material and place say about how long its light stays true.
 fn lasting(scene: &Scene, patch: &Patch) -> Lasting {
     let triangle = &scene.triangles[patch.first_triangle as usize];
@@ -376,6 +377,6 @@ fn lasting(scene: &Scene, patch: &Patch) -> Lasting {
         },
         point: scene.positions[triangle.positions[0] as usize],
         alpha: roughness * roughness,
-        shine: material.metallic.max(LEAST_SHINE),
+        shine: material.metallic,
     }
 }

@@ -22,7 +22,7 @@ const BELIEF: f32 = 3.0;
 const LEAST_WORTH: f32 = 0.01;
 /// Turn of the eye, in half widths of the lobe, after which a reflection of the sun is
 /// another one.
-const STALE: f32 = 0.25;
+const STALE: f32 = 1.0;
 
 /// A block that gets one path for each of its texels, or for each square of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
