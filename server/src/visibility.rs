@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use glam::{Mat4, Vec2, Vec3, vec2};
 use shadecast_protocol::{Fov, Pose, ViewReport};
-use shadecast_shaders::visibility::{IDS_SOURCE, MARK_SOURCE};
+use shadecast_shaders::visibility::{IDS_SOURCE, MARK_SOURCE, seen_words};
 use wgpu::ShaderStages;
 
 use crate::{
@@ -186,8 +186,13 @@ impl Visibility {
             })
             .collect();
         let mark_layout = layout(gpu, ShaderStages::COMPUTE, &[Binding::Ids, Binding::Write]);
-        let mark = gpu.compute_pipeline(MARK_SOURCE, "mark", &[&mark_layout], &[]);
-        let bytes = (scene.patches.len().max(1) * 4) as u64;
+        let mark = gpu.compute_pipeline(
+            MARK_SOURCE,
+            "mark",
+            &[&mark_layout],
+            &[("PATCHES", scene.patches.len() as f64)],
+        );
+        let words = seen_words(scene.patches.len().max(1) as u32);
         Ok(Self {
             pipelines,
             mark,
@@ -195,7 +200,7 @@ impl Visibility {
             group,
             matrices,
             most_matrices,
-            counts: gpu.scratch("pixels of patch", bytes)?,
+            counts: gpu.scratch("pixels of patch", u64::from(words) * 4)?,
             target: None,
             pictures: 0,
         })

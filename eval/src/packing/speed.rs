@@ -12,7 +12,10 @@ use shadecast_server::{
     atlas::{Atlas, AtlasShape, AtlasTwin, Placed},
     patches::PatchedScene,
 };
-use shadecast_shaders::atlas::Seen;
+use shadecast_shaders::{
+    atlas::Seen,
+    visibility::{seen_words, with_seen_bits},
+};
 
 use super::{quadtree::Quadtree, trace};
 use crate::{
@@ -156,7 +159,7 @@ struct OnGpu {
 
 impl OnGpu {
     fn new(gpu: &Gpu, shape: AtlasShape, patches: u32) -> Result<Self> {
-        let pixels = gpu.scratch("pixels of patch", u64::from(patches) * 4)?;
+        let pixels = gpu.scratch("pixels of patch", u64::from(seen_words(patches)) * 4)?;
         Ok(Self {
             atlas: Atlas::new(gpu, shape, patches, &pixels)?,
             pixels,
@@ -180,6 +183,7 @@ impl OnGpu {
             wishes[seen.patch as usize] = seen.wish.word();
         }
         let queue = &gpu.queue;
+        let pixels = with_seen_bits(pixels);
         queue.write_buffer(&self.pixels, 0, bytemuck::cast_slice(&pixels));
         queue.write_buffer(self.atlas.wishes(), 0, bytemuck::cast_slice(&wishes));
         queue.submit([]);

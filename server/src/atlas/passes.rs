@@ -92,6 +92,7 @@ pub(super) struct Passes {
     active: wgpu::Buffer,
     tally: wgpu::Buffer,
     state: wgpu::Buffer,
+    held: wgpu::Buffer,
     readback: wgpu::Buffer,
     shape: AtlasShape,
     patches: u32,
@@ -119,6 +120,10 @@ impl Passes {
         let blocks = gpu.scratch("blocks of patches", of_patches(8))?;
         let active = gpu.scratch("active patches", of_patches(ACTIVE))?;
         let listed = gpu.scratch("lists of runs", of_patches(4))?;
+        let held = gpu.scratch(
+            "patches with blocks",
+            u64::from(patches.div_ceil(32).max(1)) * 4,
+        )?;
         let run_counts = gpu.scratch("active patches of runs", runs * 8)?;
         let slots = gpu.scratch("slots of runs", runs * 4 * 3 * u64::from(levels))?;
         let tally = gpu.scratch("tally of the atlas", TALLY_BYTES)?;
@@ -133,6 +138,7 @@ impl Passes {
                 Binding::Uniform,
                 Binding::Read,
                 Binding::Read,
+                Binding::Write,
                 Binding::Write,
                 Binding::Write,
                 Binding::Write,
@@ -158,6 +164,7 @@ impl Passes {
                 &state,
                 &stacks,
                 &listed,
+                &held,
             ],
         );
         let constants = [("RUN", f64::from(run)), ("LANES", f64::from(lanes))];
@@ -181,6 +188,7 @@ impl Passes {
             active,
             tally,
             state,
+            held,
             readback: gpu.readback("placement", STATE),
             shape,
             patches,
@@ -211,6 +219,8 @@ impl Passes {
         let none = vec![NONE; (self.blocks.size() / 4) as usize];
         gpu.queue
             .write_buffer(&self.blocks, 0, bytemuck::cast_slice(&none));
+        let nobody = vec![0; self.held.size() as usize];
+        gpu.queue.write_buffer(&self.held, 0, &nobody);
         let empty = AtlasState::empty(self.shape.log2_side(), self.shape.texels());
         gpu.queue
             .write_buffer(&self.state, 0, bytemuck::bytes_of(&empty));

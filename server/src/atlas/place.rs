@@ -23,8 +23,8 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// An empty atlas for a scene of so many patches. `pixels` will hold those
-    /// that each patch covers in this frame, as words.
+    /// An empty atlas for a scene of so many patches. `pixels` will hold
+    /// what [`mark`](shadecast_shaders::visibility::MARK_SOURCE) leaves of the frame.
     ///
     /// # Errors
     /// When lists of so many patches are larger than the device binds.

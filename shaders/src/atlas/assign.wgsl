@@ -67,6 +67,12 @@ fn assign(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
             }
         }
         active_patches[i].after = position;
-        blocks[active_patches[i].patch_id] = vec2<u32>(position, (bits & LEVEL_BITS) | ((bits >> AGE_SHIFT) << 8u));
+        let patch_id = active_patches[i].patch_id;
+        if (position == NONE) {
+            atomicAnd(&held[patch_id / 32u], ~(1u << (patch_id % 32u)));
+        } else if (active_patches[i].before == NONE) {
+            atomicOr(&held[patch_id / 32u], 1u << (patch_id % 32u));
+        }
+        blocks[patch_id] = vec2<u32>(position, (bits & LEVEL_BITS) | ((bits >> AGE_SHIFT) << 8u));
     }
 }

@@ -1,4 +1,5 @@
-// Lists the patches that are visible or have a block, by ascending patch.
+// Lists the patches that are visible or have a block, by ascending patch, without a look
+// at the others: they are told by bits.
 // One thread per run of patches counts, a group sums up, one thread per run writes.
 // Twin: `Placer::gather` in place.rs.
 
@@ -31,11 +32,17 @@ fn count_active(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workg
     let begin = run * RUN;
     let end = min(begin + RUN, atlas.patch_count);
     var found = vec2<u32>(0u);
-    for (var patch_id = begin; patch_id < end; patch_id++) {
-        let visible = pixels_of_patch[patch_id] != 0u;
-        if (visible || blocks[patch_id].x != NONE) {
-            listed[begin + found.x] = patch_id;
-            found += vec2<u32>(1u, u32(visible));
+    for (var word = begin / 32u; word * 32u < end; word++) {
+        let seen = pixels_of_patch[atlas.patch_count + word];
+        // The run may begin and end within a word.
+        let first = max(begin, word * 32u) - word * 32u;
+        let count = min(end - word * 32u, 32u) - first;
+        var left = extractBits(seen | atomicLoad(&held[word]), first, count) << first;
+        while (left != 0u) {
+            let bit = firstTrailingBit(left);
+            listed[begin + found.x] = word * 32u + bit;
+            found += vec2<u32>(1u, (seen >> bit) & 1u);
+            left &= left - 1u;
         }
     }
     runs[run] = found;

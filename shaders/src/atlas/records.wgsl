@@ -101,7 +101,7 @@ override RUN: u32 = 32u;
 override LANES: u32 = 256u;
 
 @group(0) @binding(0) var<uniform> atlas: AtlasParameters;
-// By patch.
+// By patch; then a bit for each that has any.
 @group(0) @binding(1) var<storage, read> pixels_of_patch: array<u32>;
 @group(0) @binding(2) var<storage, read> wishes: array<u32>;
 // Position, or NONE; level | frames without being seen << 8.
@@ -121,6 +121,8 @@ override LANES: u32 = 256u;
 // From the beginning of each run of patches on, those that are active; then from
 // the beginning of each run of active patches on, which of them change.
 @group(0) @binding(10) var<storage, read_write> listed: array<u32>;
+// A bit for each patch that has a block.
+@group(0) @binding(11) var<storage, read_write> held: array<atomic<u32>>;
 
 fn runs_of(count: u32) -> u32 {
     return (count + RUN - 1u) / RUN;

@@ -1,13 +1,21 @@
-// Counts the pixels of each patch in an id picture; a patch with any is visible.
+// Counts the pixels of each patch in an id picture; a patch with any is visible, and
+// has its bit behind the counts, so that nobody has to look at all of them.
 // One thread per four pixels of a row; equal neighbours are counted together.
-// Source: SAS 2018, section 3.1. Twin: mark.rs.
+// Source: SAS 2018, section 3.1. Twin: mod.rs.
 
 @group(0) @binding(0) var ids: texture_2d<u32>;
+// By patch; then a bit for each.
 @group(0) @binding(1) var<storage, read_write> pixels_of_patch: array<atomic<u32>>;
 
+override PATCHES: u32;
+
 fn count(id: u32, pixels: u32) {
-    if (id != 0u && id <= arrayLength(&pixels_of_patch)) {
-        atomicAdd(&pixels_of_patch[id - 1u], pixels);
+    if (id == 0u || id > PATCHES) {
+        return;
+    }
+    let patch_id = id - 1u;
+    if (atomicAdd(&pixels_of_patch[patch_id], pixels) == 0u) {
+        atomicOr(&pixels_of_patch[PATCHES + patch_id / 32u], 1u << (patch_id % 32u));
     }
 }
 

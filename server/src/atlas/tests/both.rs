@@ -3,7 +3,10 @@
 use std::cell::RefCell;
 
 use proptest::test_runner::{Config, TestRunner};
-use shadecast_shaders::atlas::{Seen, Wish};
+use shadecast_shaders::{
+    atlas::{Seen, Wish},
+    visibility::{seen_words, with_seen_bits},
+};
 
 use super::{
     super::{AtlasShape, AtlasTwin, KEEP_UNSEEN, Placed, passes::Threads, place::Atlas},
@@ -29,7 +32,9 @@ pub(super) struct Both {
 impl Both {
     pub(super) fn new(shape: AtlasShape, patches: u32) -> Self {
         let gpu = Gpu::open().expect("a GPU");
-        let pixels = gpu.scratch("pixels", u64::from(patches) * 4).expect("room");
+        let pixels = gpu
+            .scratch("pixels", u64::from(seen_words(patches)) * 4)
+            .expect("room");
         let atlas = Atlas::new(&gpu, shape, patches, &pixels).expect("room");
         Self {
             gpu,
@@ -68,7 +73,11 @@ impl Both {
             wishes[seen.patch as usize] = seen.wish.word();
         }
         let queue = &self.gpu.queue;
-        queue.write_buffer(&self.pixels, 0, bytemuck::cast_slice(&pixels));
+        queue.write_buffer(
+            &self.pixels,
+            0,
+            bytemuck::cast_slice(&with_seen_bits(pixels)),
+        );
         queue.write_buffer(self.atlas.wishes(), 0, bytemuck::cast_slice(&wishes));
         let encoder = self
             .gpu
