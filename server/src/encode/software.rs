@@ -18,6 +18,8 @@ const NO_DEBLOCKING: i32 = 1;
 /// The encoder that every build has.
 pub struct OpenH264 {
     encoder: Encoder,
+    /// The quantisation parameter of all pictures, where it is not the bits that count.
+    quality: Option<u8>,
     configured_for: Option<(u32, u32)>,
 }
 
@@ -35,31 +37,38 @@ impl OpenH264 {
     /// # Errors
     /// When the library refuses the configuration.
     pub fn new(bits_per_second: u32, pictures_per_second: f32) -> Result<Self, EncodeError> {
-        let config = EncoderConfig::new()
-            .bitrate(BitRate::from_bps(bits_per_second))
-            .max_frame_rate(FrameRate::from_hz(pictures_per_second))
-            .rate_control_mode(RateControlMode::Bitrate)
-            .usage_type(UsageType::CameraVideoRealTime)
-            .complexity(Complexity::Low)
-            .sps_pps_strategy(SpsPpsStrategy::ConstantId)
-            .intra_frame_period(IntraFramePeriod::from_num_frames(0))
-            .scene_change_detect(false)
-            .background_detection(false)
-            .adaptive_quantization(false)
-            .skip_frames(false)
-            .num_threads(1)
-            .vui(VuiConfig::bt709());
+        Self::configured(
+            config()
+                .bitrate(BitRate::from_bps(bits_per_second))
+                .max_frame_rate(FrameRate::from_hz(pictures_per_second))
+                .rate_control_mode(RateControlMode::Bitrate),
+            None,
+        )
+    }
+
+    /// Of one quality, however many bits it takes: to compare what is encoded.
+    /// `step` is H.264's quantisation parameter, from 0 to 51.
+    ///
+    /// # Errors
+    /// When the library refuses the configuration.
+    pub fn of_quality(step: u8) -> Result<Self, EncodeError> {
+        let config = config().rate_control_mode(RateControlMode::Off);
+        Self::configured(config, Some(step.min(51)))
+    }
+
+    fn configured(config: EncoderConfig, quality: Option<u8>) -> Result<Self, EncodeError> {
         let encoder = Encoder::with_api_config(OpenH264API::from_source(), config)
             .map_err(|error| EncodeError(error.to_string()))?;
         Ok(Self {
             encoder,
+            quality,
             configured_for: None,
         })
     }
 
-    /// The crate has no switch for the deblocking filter, and configures the
-    /// encoder at the first picture of a size: so that picture is encoded
-    /// once, thrown away, and the filter turned off before the real one.
+    /// The crate has no switch for the deblocking filter nor for a fixed quality, and
+    /// configures the encoder at the first picture of a size: so that picture is
+    /// encoded once, thrown away, and both are set before the real one.
     fn configure(&mut self, planes: &Planes) -> Result<(), EncodeError> {
         let failed = |error: openh264::Error| EncodeError(error.to_string());
         self.encoder.encode(&Source(planes)).map_err(failed)?;
@@ -70,7 +79,11 @@ impl OpenH264 {
         let refused = unsafe {
             let api = self.encoder.raw_api();
             let mut refused = api.get_option(ENCODER_OPTION_SVC_ENCODE_PARAM_EXT, raw);
-            (*raw.cast::<SEncParamExt>()).iLoopFilterDisableIdc = NO_DEBLOCKING;
+            let parameters = &mut *raw.cast::<SEncParamExt>();
+            parameters.iLoopFilterDisableIdc = NO_DEBLOCKING;
+            if let Some(step) = self.quality {
+                parameters.sSpatialLayers[0].iDLayerQp = step.into();
+            }
             if refused == 0 {
                 refused = api.set_option(ENCODER_OPTION_SVC_ENCODE_PARAM_EXT, raw);
             }
@@ -78,12 +91,27 @@ impl OpenH264 {
         };
         if refused != 0 {
             return Err(EncodeError(format!(
-                "deblocking cannot be turned off (code {refused})"
+                "deblocking and quality cannot be set (code {refused})"
             )));
         }
         self.configured_for = Some((planes.width, planes.height));
         Ok(())
     }
+}
+
+/// What does not depend on who encodes.
+fn config() -> EncoderConfig {
+    EncoderConfig::new()
+        .usage_type(UsageType::CameraVideoRealTime)
+        .complexity(Complexity::Low)
+        .sps_pps_strategy(SpsPpsStrategy::ConstantId)
+        .intra_frame_period(IntraFramePeriod::from_num_frames(0))
+        .scene_change_detect(false)
+        .background_detection(false)
+        .adaptive_quantization(false)
+        .skip_frames(false)
+        .num_threads(1)
+        .vui(VuiConfig::bt709())
 }
 
 impl VideoEncoder for OpenH264 {
@@ -174,6 +202,20 @@ mod tests {
                 );
             }
         }
+    }
+
+    #[test]
+    fn a_coarser_quality_takes_fewer_bytes() {
+        let bytes = [10, 24, 40].map(|step| {
+            let mut encoder = OpenH264::of_quality(step).unwrap();
+            let mut planes = blocks(0);
+            // Detail that quantisation can lose.
+            for (i, value) in planes.bytes[..128 * 128].iter_mut().enumerate() {
+                *value += (i * 7 % 13) as u8;
+            }
+            encoder.encode(&planes, true).unwrap().bytes.len()
+        });
+        assert!(bytes.is_sorted_by(|a, b| a > b), "{bytes:?}");
     }
 
     #[test]
