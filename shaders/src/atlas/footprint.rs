@@ -98,7 +98,7 @@ pub fn footprint(shape: u32, corners: &[Vec3; 5], eye: Vec3, pixels_per_radian: 
 
 /// Heron's formula in Kahan's order, which stays exact for needles; zero where
 /// the lengths make no triangle.
-fn triangle_area(a: f32, b: f32, c: f32) -> f32 {
+pub(crate) fn triangle_area(a: f32, b: f32, c: f32) -> f32 {
     let mut sides = [a, b, c].map(f64::from);
     sides.sort_by(|x, y| y.total_cmp(x));
     let [a, b, c] = sides;

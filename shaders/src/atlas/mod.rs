@@ -25,7 +25,7 @@
 //! accumulated light should survive a flicker.
 
 mod bias;
-mod footprint;
+pub(crate) mod footprint;
 mod level;
 mod memory;
 mod place;
@@ -58,6 +58,7 @@ pub const SOURCE: &str = concat!(
 /// Kernel `measure_footprints`.
 pub const FOOTPRINT_SOURCE: &str = concat!(
     include_str!("../light/scene.wgsl"),
+    include_str!("edges.wgsl"),
     include_str!("footprint.wgsl")
 );
 
