@@ -18,8 +18,9 @@ pub struct DrawVertex {
     pub position: [f32; 3],
     /// Index into [`ClientFrame::motions`].
     pub object: u32,
-    /// Atlas position in texels; texel centres lie at halves.
-    pub texel: [f32; 2],
+    /// Atlas position in texels, homogeneous; texel centres lie at halves. The last is
+    /// 1 but in the slots of foreshortened triangles.
+    pub texel: [f32; 3],
 }
 
 /// A decoded 4:2:0 picture, limited-range BT.709, planes without padding.
@@ -147,6 +148,8 @@ pub struct ClientFrame {
     pub indices: Arc<Vec<u32>>,
     /// How many of the indices, from the first on, need no mask.
     pub opaque_indices: u32,
+    /// Whether a triangle's texels are unevenly spaced on it, so that a lookup must divide.
+    pub foreshortened: bool,
     /// How long after `scene_time` the objects are where `motions` says, nanoseconds.
     pub objects_lead: u64,
     /// `world_from_object` of every object; index 0 is the identity.

@@ -181,6 +181,7 @@ mod tests {
             vertices: Arc::default(),
             indices: Arc::default(),
             opaque_indices: 0,
+            foreshortened: false,
             objects_lead: 0,
             motions: Arc::default(),
             picture: DecodedPicture::from(YuvPicture {

@@ -190,7 +190,7 @@ impl Session {
         self.welcomes = self.welcomes.wrapping_add(1);
         self.backoff = BACKOFF_MIN;
         self.state = State::Streaming(Box::new(Connection {
-            stream: Stream::new(self.welcomes, welcome.atlas_size),
+            stream: Stream::new(self.welcomes, welcome.atlas_size, welcome.method),
             clock: ClockEstimate::default(),
             next_view: ViewSeq(0),
             acknowledged: None,

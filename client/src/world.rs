@@ -2,7 +2,7 @@
 //!
 //! An [`Update`] is checked wholly before any of it is taken, so that a bad one
 //! changes nothing. Geometry is learnt once and stays known; which patch has
-//! which block is forgotten at every new epoch (SAS 2018, section 4.2). A patch
+//! which slot is forgotten at every new epoch (SAS 2018, section 4.2). A patch
 //! is stored as slots into one array of positions, so that the corners of all
 //! placed patches are laid out anew without looking up a single vertex id, and
 //! only when something changed.
@@ -16,7 +16,8 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use shadecast_protocol::{
-    Block, Epoch, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Pose, Update, VertexId,
+    Epoch, Method, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Pose, Slot, Update,
+    VertexId,
 };
 
 use crate::{ClientFrame, ClientTiming, DecodedPicture, DrawVertex, MaskAtlas};
@@ -27,6 +28,7 @@ pub use check::WorldError;
 #[derive(Debug)]
 pub struct World {
     atlas_size: [u16; 2],
+    method: Method,
     epoch: Option<Epoch>,
     /// Slot of a vertex in `positions`.
     vertices: HashMap<VertexId, u32>,
@@ -53,8 +55,8 @@ struct Patch {
 /// Where a patch is in the atlas.
 #[derive(Debug)]
 struct Placed {
-    block: Block,
-    /// One bit a texel of the block; none where the whole block is there.
+    slot: Slot,
+    /// One bit a texel of the slot's bounds; none where all of the slot is there.
     mask: Option<Box<[u8]>>,
 }
 
@@ -64,6 +66,7 @@ struct Geometry {
     vertices: Arc<Vec<DrawVertex>>,
     indices: Arc<Vec<u32>>,
     opaque_indices: u32,
+    foreshortened: bool,
 }
 
 /// The masks of all placed patches as one picture.
@@ -74,11 +77,13 @@ enum MaskState {
 }
 
 impl World {
-    /// An empty world with an atlas of this width and height in texels.
+    /// An empty world with an atlas of this width and height in texels, in which
+    /// patches are placed by `method`.
     #[must_use]
-    pub fn new(atlas_size: [u16; 2]) -> Self {
+    pub fn new(atlas_size: [u16; 2], method: Method) -> Self {
         Self {
             atlas_size,
+            method,
             epoch: None,
             vertices: HashMap::new(),
             positions: Vec::new(),
@@ -98,7 +103,7 @@ impl World {
 
     /// Takes an update whole, or changes nothing.
     ///
-    /// An update of a newer epoch drops all placements and masks first. Blocks
+    /// An update of a newer epoch drops all placements and masks first. Slots
     /// may overlap: what is drawn there is then wrong, and nothing else is.
     ///
     /// # Errors
@@ -148,6 +153,7 @@ impl World {
             vertices: geometry.vertices,
             indices: geometry.indices,
             opaque_indices: geometry.opaque_indices,
+            foreshortened: geometry.foreshortened,
             objects_lead: update.objects_lead,
             motions: Arc::clone(&self.motions),
             picture,
@@ -218,7 +224,7 @@ impl World {
         }
         for placement in &update.placements {
             let placed = Placed {
-                block: placement.block,
+                slot: placement.slot,
                 mask: None,
             };
             let before = self.placed.insert(placement.patch, placed);
@@ -244,6 +250,7 @@ impl World {
         let opaque_indices = indices.len() as u32;
         self.build_patches(true, &mut vertices, &mut indices);
         Geometry {
+            foreshortened: vertices.iter().any(|vertex| vertex.texel[2] != 1.0),
             vertices: Arc::new(vertices),
             indices: Arc::new(indices),
             opaque_indices,
@@ -251,20 +258,17 @@ impl World {
     }
 
     fn build_patches(&self, masked: bool, vertices: &mut Vec<DrawVertex>, indices: &mut Vec<u32>) {
-        for (id, Placed { block, mask }) in &self.placed {
+        for (id, Placed { slot, mask }) in &self.placed {
             let Some(patch) = self.patches.get(id).filter(|_| mask.is_some() == masked) else {
                 continue;
             };
             let first = vertices.len() as u32;
-            let (width, height) = block.level.size();
-            let span = [(width - 1) as f32, (height - 1) as f32];
-            let origin = [f32::from(block.x) + 0.5, f32::from(block.y) + 0.5];
-            for (uv, &slot) in patch.shape.corners().iter().zip(&patch.corners) {
-                let [x, y] = block.level.turn(*uv);
+            let corners = patch.shape.corners().iter().zip(&patch.corners);
+            for (corner, (uv, &position)) in corners.enumerate() {
                 vertices.push(DrawVertex {
-                    position: self.positions[slot as usize].to_array(),
+                    position: self.positions[position as usize].to_array(),
                     object: u32::from(patch.object.0),
-                    texel: [origin[0] + x * span[0], origin[1] + y * span[1]],
+                    texel: texel_of_corner(*slot, corner, *uv),
                 });
             }
             for triangle in patch.shape.triangles() {
@@ -289,18 +293,20 @@ impl World {
     fn build_masks(&self) -> Option<Arc<MaskAtlas>> {
         let [width, height] = self.atlas_size.map(usize::from);
         let mut coverage = Vec::new();
-        for Placed { block, mask } in self.placed.values() {
+        for Placed { slot, mask } in self.placed.values() {
             let Some(bits) = mask else {
                 continue;
             };
             coverage.resize(width * height, 255);
-            let (block_width, block_height) = block.level.size();
-            for row in 0..block_height as usize {
-                let start = (usize::from(block.y) + row) * width + usize::from(block.x);
-                for column in 0..block_width as usize {
-                    let bit = row * block_width as usize + column;
+            let bounds = slot.bounds();
+            let rows = bounds.y..bounds.y + bounds.height;
+            let texels =
+                rows.flat_map(|y| (bounds.x..bounds.x + bounds.width).map(move |x| (x, y)));
+            for (bit, (x, y)) in texels.enumerate() {
+                // Slots of triangles lie in each other's bounds.
+                if slot.owns(x, y) {
                     let is_there = bits[bit / 8] >> (bit % 8) & 1 == 1;
-                    coverage[start + column] = if is_there { 255 } else { 0 };
+                    coverage[y as usize * width + x as usize] = if is_there { 255 } else { 0 };
                 }
             }
         }
@@ -311,5 +317,20 @@ impl World {
                 coverage,
             })
         })
+    }
+}
+
+/// Homogeneous texel coordinates of a patch's corner with these patch coordinates.
+fn texel_of_corner(slot: Slot, corner: usize, uv: [f32; 2]) -> [f32; 3] {
+    match slot {
+        Slot::Block(block) => {
+            let (width, height) = block.level.size();
+            let span = [(width - 1) as f32, (height - 1) as f32];
+            let origin = [f32::from(block.x) + 0.5, f32::from(block.y) + 0.5];
+            let [x, y] = block.level.turn(uv);
+            [origin[0] + x * span[0], origin[1] + y * span[1], 1.0]
+        }
+        // Only patches of one triangle have such slots.
+        Slot::Triangle(slot) => slot.homogeneous(corner.min(2)),
     }
 }

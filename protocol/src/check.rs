@@ -5,7 +5,8 @@ use glam::Vec3;
 
 use crate::{
     Block, ClockReply, Hello, Level, MIN_LOG2_SIDE, ObjectId, PatchGeometry, PatchId, Picture,
-    Placement, Pose, Update, VertexId, ViewReport, Welcome, WireError,
+    Placement, Pose, SLOT_UNITS, Slot, TriangleSlot, Update, VertexId, ViewReport, Welcome,
+    WireError,
     wire::{MAX_MESSAGE_BYTES, MAX_PATCHES, MAX_VERTICES, within},
 };
 
@@ -13,6 +14,9 @@ use crate::{
 /// decoders take.
 const MAX_LOG2_SIDE: u8 = 13;
 const MAX_SIDE: u16 = 1 << MAX_LOG2_SIDE;
+/// Largest side of a triangle slot's bounds, texels: far beyond what one triangle is
+/// shaded with, and kernels square it in 32 bits.
+const MAX_TRIANGLE_SIDE: u32 = 2048;
 /// Smallest atlas side, texels: room for a few blocks of every level.
 const MIN_ATLAS_SIDE: u16 = 64;
 /// H.264 codes macroblocks of 16 x 16 texels.
@@ -104,8 +108,16 @@ pub(crate) fn update(update: &Update) -> Result<(), WireError> {
 
     let placements = update.placements.iter().map(|placement| placement.patch.0);
     rules.ascending(placements, MAX_PATCHES, "placement")?;
+    let kind = |slot| matches!(slot, Slot::Block(_));
     for placement in &update.placements {
-        rules.block(placement.block)?;
+        rules.demand(
+            kind(placement.slot) == kind(update.placements[0].slot),
+            "mixture of slots",
+        )?;
+        match placement.slot {
+            Slot::Block(block) => rules.block(block)?,
+            Slot::Triangle(slot) => rules.triangle(slot)?,
+        }
     }
 
     let masks = update.masks.iter().map(|mask| mask.patch.0);
@@ -132,8 +144,13 @@ pub(crate) fn mask_bytes(placements: &[Placement], patch: PatchId) -> Option<usi
     let index = placements
         .binary_search_by_key(&patch, |placement| placement.patch)
         .ok()?;
-    let level = placements[index].block.level;
-    let texels = 1_usize.checked_shl((level.width + level.height).into())?;
+    let texels = match placements[index].slot {
+        // Its level has not been checked.
+        Slot::Block(block) => {
+            1_usize.checked_shl((block.level.width + block.level.height).into())?
+        }
+        Slot::Triangle(slot) => slot.bounds().area() as usize,
+    };
     Some(texels.div_ceil(8))
 }
 
@@ -195,5 +212,19 @@ impl Rules {
         let (x, y) = (u32::from(block.x), u32::from(block.y));
         let inside = x + width <= MAX_SIDE.into() && y + height <= MAX_SIDE.into();
         self.demand(x % 2 == 0 && y % 2 == 0 && inside, "block position")
+    }
+
+    fn triangle(&self, slot: TriangleSlot) -> Result<(), WireError> {
+        let largest = slot.weights.iter().max() == Some(&u16::MAX);
+        self.demand(largest && !slot.weights.contains(&0), "weights of a slot")?;
+        let bounds = slot.bounds();
+        let fits = bounds.width <= MAX_TRIANGLE_SIDE && bounds.height <= MAX_TRIANGLE_SIDE;
+        self.demand(fits, "slot size")?;
+        // A lookup at a corner reaches half a texel further.
+        let middle = (SLOT_UNITS / 2) as u16;
+        let inside = slot.corners.iter().flatten().all(|at| *at >= middle)
+            && bounds.x + bounds.width <= MAX_SIDE.into()
+            && bounds.y + bounds.height <= MAX_SIDE.into();
+        self.demand(inside, "slot position")
     }
 }

@@ -2,9 +2,9 @@
 //!
 //! What is alike stands together: all ids of a list, all levels of blocks,
 //! all first bytes of coordinates. Ids ascend, so that only the gaps between
-//! them are sent; a patch's corners resemble those of the patch before, and a
-//! block stands beside the one before of its level, so that only differences
-//! are sent. Nothing is sent that the reader can tell: repeated corners, the
+//! them are sent; a patch's corners resemble those of the patch before, a block
+//! stands beside the one before of its level, and a triangle's slot beside that of
+//! the triangle before, so that only differences are sent. Nothing is sent that the reader can tell: repeated corners, the
 //! length of a mask.
 //!
 //! Measured on the built-in courtyard: a patch at first sight, with its
@@ -18,8 +18,8 @@ use serde::{Deserialize, Serialize};
 use zstd::{bulk::Compressor, stream::read::Decoder, zstd_safe::CParameter};
 
 use crate::{
-    Block, BlockMask, Epoch, FrameId, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape,
-    Placement, Pose, Update, UpdateTiming, Vertex, VertexId, WireError, check,
+    Block, Epoch, FrameId, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Placement,
+    Pose, Slot, SlotMask, TriangleSlot, Update, UpdateTiming, Vertex, VertexId, WireError, check,
     delta::{from_planes, gaps, ids, planes},
     wire::{MAX_PATCHES, MAX_UPDATE_BYTES, MAX_VERTICES, parse, within},
 };
@@ -103,12 +103,19 @@ struct Columns {
     removals: Vec<u32>,
     /// Gaps between ids.
     placements: Vec<u32>,
-    /// log2 of the texels along the patch's u in the high four bits, along v in the low four.
+    /// Of blocks: log2 of the texels along the patch's u in the high four bits, along v
+    /// in the low four. None where slots are triangles.
     levels: Vec<u8>,
-    /// Half the difference of x to the block before of the same level.
+    /// Of blocks: half the difference of x to the block before of the same level. Of
+    /// triangles: that of their first corner to the triangle's before.
     x: Vec<i16>,
-    /// Half the difference of y to the block before of the same level.
+    /// The same of y.
     y: Vec<i16>,
+    /// Of triangles: x, y of the second corner less those of the first, then of the
+    /// third; each for all triangles.
+    edges: Vec<i16>,
+    /// Of triangles: those of the first corners, of the second, and of the third.
+    weights: Vec<u16>,
     /// Gaps between ids.
     masks: Vec<u32>,
     /// The bits of all masks.
@@ -121,17 +128,7 @@ impl From<&Update> for Columns {
         let axis = |i: usize| update.vertices.iter().map(move |v| v.position[i]).collect();
         let positions: [Vec<f32>; 3] = [axis(0), axis(1), axis(2)];
 
-        let mut last = [[0_i16; 2]; 256];
-        let (x, y) = update
-            .placements
-            .iter()
-            .map(|Placement { block, .. }| {
-                let half = [(block.x / 2) as i16, (block.y / 2) as i16];
-                let last = &mut last[usize::from(level_byte(block.level))];
-                let [x, y] = std::mem::replace(last, half);
-                (half[0] - x, half[1] - y)
-            })
-            .unzip();
+        let slots = SlotColumns::from(update.placements.as_slice());
 
         Self {
             frame: update.frame,
@@ -149,13 +146,11 @@ impl From<&Update> for Columns {
             corners: corner_differences(&update.patches),
             removals: gaps(update.removals.iter().map(|patch| patch.0)),
             placements: gaps(update.placements.iter().map(|placement| placement.patch.0)),
-            levels: update
-                .placements
-                .iter()
-                .map(|placement| level_byte(placement.block.level))
-                .collect(),
-            x,
-            y,
+            levels: slots.levels,
+            x: slots.x,
+            y: slots.y,
+            edges: slots.edges,
+            weights: slots.weights,
             masks: gaps(update.masks.iter().map(|mask| mask.patch.0)),
             mask_bits: update
                 .masks
@@ -245,33 +240,68 @@ impl Columns {
     fn placements(&self) -> Option<Vec<Placement>> {
         let ids = ids(&self.placements, MAX_PATCHES)?;
         let count = ids.len();
-        if self.levels.len() != count || self.x.len() != count || self.y.len() != count {
+        if self.x.len() != count || self.y.len() != count {
+            return None;
+        }
+        let slots = if self.edges.is_empty() && self.weights.is_empty() {
+            self.blocks(count)?
+        } else {
+            self.triangles(count)?
+        };
+        let placements = ids.into_iter().zip(slots).map(|(id, slot)| Placement {
+            patch: PatchId(id),
+            slot,
+        });
+        Some(placements.collect())
+    }
+
+    fn blocks(&self, count: usize) -> Option<Vec<Slot>> {
+        if self.levels.len() != count {
             return None;
         }
         let mut last = [[0_i16; 2]; 256];
-        ids.into_iter()
-            .enumerate()
-            .map(|(i, id)| {
+        (0..count)
+            .map(|i| {
                 let byte = self.levels[i];
                 let half = &mut last[usize::from(byte)];
                 *half = [
                     half[0].checked_add(self.x[i])?,
                     half[1].checked_add(self.y[i])?,
                 ];
-                Some(Placement {
-                    patch: PatchId(id),
-                    block: Block {
-                        x: u16::try_from(half[0]).ok()? * 2,
-                        y: u16::try_from(half[1]).ok()? * 2,
-                        level: level_from_byte(byte),
-                    },
-                })
+                Some(Slot::Block(Block {
+                    x: u16::try_from(half[0]).ok()? * 2,
+                    y: u16::try_from(half[1]).ok()? * 2,
+                    level: level_from_byte(byte),
+                }))
             })
             .collect()
     }
 
-    /// The masks, cut from the bits by the sizes of the blocks that they mask.
-    fn masks(&self, placements: &[Placement]) -> Option<Vec<BlockMask>> {
+    fn triangles(&self, count: usize) -> Option<Vec<Slot>> {
+        let lengths = (self.levels.len(), self.edges.len(), self.weights.len());
+        if lengths != (0, 4 * count, 3 * count) {
+            return None;
+        }
+        let mut last = [0_u16; 2];
+        let triangles = (0..count).map(|i| {
+            last = [
+                last[0].wrapping_add_signed(self.x[i]),
+                last[1].wrapping_add_signed(self.y[i]),
+            ];
+            let corner = |k: usize| {
+                let along = |axis: usize| self.edges[(2 * k + axis) * count + i];
+                [0, 1].map(|axis| last[axis].wrapping_add_signed(along(axis)))
+            };
+            Slot::Triangle(TriangleSlot {
+                corners: [last, corner(0), corner(1)],
+                weights: [0, 1, 2].map(|k| self.weights[k * count + i]),
+            })
+        });
+        Some(triangles.collect())
+    }
+
+    /// The masks, cut from the bits by the sizes of the slots that they mask.
+    fn masks(&self, placements: &[Placement]) -> Option<Vec<SlotMask>> {
         let mut rest = self.mask_bits.as_slice();
         let masks = ids(&self.masks, MAX_PATCHES)?
             .into_iter()
@@ -279,7 +309,7 @@ impl Columns {
                 let patch = PatchId(id);
                 let (bits, after) = rest.split_at_checked(check::mask_bytes(placements, patch)?)?;
                 rest = after;
-                Some(BlockMask {
+                Some(SlotMask {
                     patch,
                     bits: bits.to_vec(),
                 })
@@ -287,6 +317,56 @@ impl Columns {
             .collect::<Option<_>>()?;
         rest.is_empty().then_some(masks)
     }
+}
+
+/// The slots of placements, which are all of one kind.
+#[derive(Default)]
+struct SlotColumns {
+    levels: Vec<u8>,
+    x: Vec<i16>,
+    y: Vec<i16>,
+    edges: Vec<i16>,
+    weights: Vec<u16>,
+}
+
+impl From<&[Placement]> for SlotColumns {
+    fn from(placements: &[Placement]) -> Self {
+        let mut columns = Self::default();
+        let mut last = [[0_i16; 2]; 256];
+        let mut last_corner = [0_u16; 2];
+        let mut triangles = Vec::new();
+        for placement in placements {
+            let [x, y] = match placement.slot {
+                Slot::Block(block) => {
+                    let byte = level_byte(block.level);
+                    columns.levels.push(byte);
+                    let half = [(block.x / 2) as i16, (block.y / 2) as i16];
+                    let before = std::mem::replace(&mut last[usize::from(byte)], half);
+                    [half[0] - before[0], half[1] - before[1]]
+                }
+                Slot::Triangle(slot) => {
+                    triangles.push(slot);
+                    let before = std::mem::replace(&mut last_corner, slot.corners[0]);
+                    difference(slot.corners[0], before)
+                }
+            };
+            columns.x.push(x);
+            columns.y.push(y);
+        }
+        for (corner, axis) in [(1, 0), (1, 1), (2, 0), (2, 1)] {
+            let edge = |slot: &TriangleSlot| difference(slot.corners[corner], slot.corners[0]);
+            (columns.edges).extend(triangles.iter().map(|slot| edge(slot)[axis]));
+        }
+        for corner in 0..3 {
+            (columns.weights).extend(triangles.iter().map(|slot| slot.weights[corner]));
+        }
+        columns
+    }
+}
+
+/// What is to be added to `b`, wrapping, to get `a`.
+fn difference(a: [u16; 2], b: [u16; 2]) -> [i16; 2] {
+    [0, 1].map(|axis| a[axis].wrapping_sub(b[axis]) as i16)
 }
 
 /// The corners that count, as what each differs by from the same corner of the

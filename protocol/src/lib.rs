@@ -13,6 +13,7 @@ mod error;
 mod ids;
 mod message;
 mod pose;
+mod slot;
 mod update;
 mod wire;
 
@@ -24,5 +25,6 @@ pub use message::{
     ToClient, ToServer, ViewReport, Welcome,
 };
 pub use pose::{EyeView, Fov, Motion, Pose};
-pub use update::{BlockMask, PatchGeometry, PatchShape, Placement, Update, UpdateTiming, Vertex};
+pub use slot::{Method, SLOT_UNITS, Slot, TexelRectangle, TriangleSlot, UnknownMethod};
+pub use update::{PatchGeometry, PatchShape, Placement, SlotMask, Update, UpdateTiming, Vertex};
 pub use wire::{MAX_MESSAGE_BYTES, MAX_PATCHES, MAX_UPDATE_BYTES, MAX_VERTICES, PROTOCOL_VERSION};

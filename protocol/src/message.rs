@@ -3,7 +3,7 @@
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::{ClientTime, Epoch, EyeView, FrameId, Pose, ServerTime, Update, ViewSeq};
+use crate::{ClientTime, Epoch, EyeView, FrameId, Method, Pose, ServerTime, Update, ViewSeq};
 
 /// The secret that the server printed; whoever knows it may connect.
 #[derive(Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -50,6 +50,8 @@ pub struct Hello {
 pub struct Welcome {
     /// What the pictures are encoded with.
     pub codec: Codec,
+    /// How patches are placed in the atlas.
+    pub method: Method,
     /// Width and height of the atlas, texels.
     pub atlas_size: [u16; 2],
     /// Side of a superblock, texels: no block is larger.

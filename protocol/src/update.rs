@@ -4,7 +4,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
 use crate::{
-    Block, ClientTime, Epoch, FrameId, Motion, ObjectId, PatchId, Pose, ServerTime, VertexId,
+    ClientTime, Epoch, FrameId, Motion, ObjectId, PatchId, Pose, ServerTime, Slot, VertexId,
     ViewSeq,
 };
 
@@ -63,7 +63,7 @@ pub struct PatchGeometry {
     pub id: PatchId,
     /// What it moves with.
     pub object: ObjectId,
-    /// How its corners lie in the block.
+    /// How its corners lie in a block.
     pub shape: PatchShape,
     /// True when it is seen from both sides.
     pub double_sided: bool,
@@ -72,22 +72,23 @@ pub struct PatchGeometry {
     pub corners: [VertexId; 5],
 }
 
-/// A patch gets a block, or another one than it had.
+/// A patch gets a slot, or another one than it had.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Placement {
     /// The patch.
     pub patch: PatchId,
-    /// Its block.
-    pub block: Block,
+    /// Its slot. All of a session are of one kind.
+    pub slot: Slot,
 }
 
 /// Which texels of an alpha-masked patch are there. Sent with its placement;
 /// scenes without alpha masks send none.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct BlockMask {
+pub struct SlotMask {
     /// The patch, placed by the same update.
     pub patch: PatchId,
-    /// One bit a texel of the block, row by row, lowest bit first.
+    /// One bit a texel of the slot's [bounds](Slot::bounds), row by row, lowest bit
+    /// first; those of texels that are not the slot's own say nothing.
     pub bits: Vec<u8>,
 }
 
@@ -128,12 +129,12 @@ pub struct Update {
     pub vertices: Vec<Vertex>,
     /// Patches that are new to the client, by ascending id.
     pub patches: Vec<PatchGeometry>,
-    /// Patches that lose their block, by ascending id; applied before `placements`.
+    /// Patches that lose their slot, by ascending id; applied before `placements`.
     pub removals: Vec<PatchId>,
-    /// Patches that get a block, by ascending id.
+    /// Patches that get a slot, by ascending id.
     pub placements: Vec<Placement>,
     /// Masks of alpha-masked patches among `placements`, by ascending id.
-    pub masks: Vec<BlockMask>,
+    pub masks: Vec<SlotMask>,
     /// Objects that move or have just stopped, by ascending id; never the world.
     pub motions: Vec<(ObjectId, Motion)>,
 }

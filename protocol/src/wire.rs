@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Picture, ToClient, ToServer, WireError, check, columns};
 
 /// Version of this protocol; both ends must agree.
-pub const PROTOCOL_VERSION: u16 = 3;
+pub const PROTOCOL_VERSION: u16 = 4;
 /// Longest message other than an update, bytes.
 pub const MAX_MESSAGE_BYTES: usize = 8 << 20;
 /// Longest update, both as it is sent and after decompression, bytes.

@@ -4,6 +4,7 @@ use std::{ffi::OsString, net::SocketAddr, path::PathBuf};
 
 use clap::{Args, Parser, Subcommand};
 use glam::Vec3;
+use shadecast_protocol::Method;
 
 /// Name of the built-in scene.
 pub(crate) const BUILT_IN: &str = "courtyard";
@@ -130,6 +131,9 @@ pub(crate) enum Environment {
 pub(crate) struct ServeArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
+    /// How the light is placed in the atlas: sas (patches in blocks that stay) or tss (triangles by themselves, anew for every picture)
+    #[arg(long, default_value_t)]
+    pub(crate) method: Method,
     /// Address and port to listen on; port 0 takes a free one
     #[arg(long, default_value = "0.0.0.0:4433")]
     pub(crate) listen: SocketAddr,

@@ -9,11 +9,12 @@ use glam::Vec3;
 use shadecast_protocol::{FrameId, Motion, PatchId, Picture, Pose, Update, UpdateTiming};
 
 use crate::{
-    atlas::{Atlas, AtlasError, AtlasShape, AtlasStats, Footprints, Placed},
+    atlas::{AtlasError, AtlasStats, Placed},
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
-    light::{Job, Lasting, Light, Repeats, Schedule, Viewer},
+    light::{Job, Lasting, Light, Repeats, Schedule, Viewer, keeps_texels},
+    packer::Packer,
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
     scene::{Material, Scene, SceneFacts},
@@ -78,7 +79,7 @@ pub struct FrameStats {
 /// Where a frame's time went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stages {
-    /// Id pictures, marking, levels and blocks: one submission.
+    /// Id pictures, marking, and where patches are shaded: one submission.
     pub visibility: Duration,
     /// What the client must be told of that.
     pub atlas: Duration,
@@ -110,8 +111,7 @@ pub struct Pipeline {
     gpu_scene: GpuScene,
     scene: PatchedScene,
     visibility: Visibility,
-    footprints: Footprints,
-    atlas: Atlas,
+    packer: Packer,
     schedule: Schedule,
     light: Light,
     picture: PictureConversion,
@@ -122,7 +122,8 @@ pub struct Pipeline {
 }
 
 impl Pipeline {
-    /// A server of `scene` with an atlas of `size` texels.
+    /// A server of `scene`, by the method that it was cut for, with an atlas of `size`
+    /// texels.
     ///
     /// # Errors
     /// When the atlas is impossible or does not fit the device.
@@ -135,12 +136,10 @@ impl Pipeline {
         encoder: Box<dyn VideoEncoder>,
         exposure: f32,
     ) -> Result<Self, FrameError> {
-        let shape = AtlasShape::new(size, superblock)?;
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
-        let (pixels, patches) = (visibility.pixels(), scene.patches.len() as u32);
-        let atlas = Atlas::new(&gpu, shape, patches, pixels)?;
-        let footprints = Footprints::new(&gpu, &gpu_scene, &scene, pixels, atlas.wishes())?;
-        let light = Light::new(&gpu, &gpu_scene, size)?;
+        let pixels = visibility.pixels();
+        let packer = Packer::new(&gpu, &gpu_scene, &scene, size, superblock, pixels)?;
+        let light = Light::new(&gpu, &gpu_scene, size, scene.method)?;
         let picture = PictureConversion::new(&gpu, light.shown(), size)?;
         let lasting = scene
             .patches
@@ -155,8 +154,7 @@ impl Pipeline {
             gpu_scene,
             scene,
             visibility,
-            footprints,
-            atlas,
+            packer,
             light,
             picture,
             encoder,
@@ -216,7 +214,7 @@ impl Pipeline {
             self.known = Known::nothing(&self.scene);
         }
         if order.reset || order.new_client {
-            self.atlas.force_reset();
+            self.packer.force_reset();
         }
         let objects_time = order.scene_time + order.objects_lead;
         let motions: Vec<Motion> = (self.scene.scene.objects.iter())
@@ -235,17 +233,15 @@ impl Pipeline {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         self.visibility
             .record(gpu, &mut encoder, gpu_scene, &order.prediction, &poses);
-        self.footprints
-            .record(gpu, &mut encoder, gpu_scene, &eyes, pixels_per_radian);
-        let placed = self.atlas.place(gpu, encoder)?;
+        let placed = (self.packer).place(gpu, gpu_scene, encoder, &eyes, pixels_per_radian)?;
         stages.visibility = lap();
 
         let mut moved = placed.moved.iter().peekable();
         for placement in &placed.placements {
             let old = moved.next_if(|(patch, ..)| *patch == placement.patch);
-            let resized = old.is_some_and(|(_, old, new)| old.level != new.level);
+            let resampled = old.is_some_and(|(_, old, new)| !keeps_texels(*old, *new));
             self.schedule
-                .placed(placement.patch, old.is_some(), resized);
+                .placed(placement.patch, old.is_some(), resampled);
         }
         let news = self.known.news(&self.scene, &placed.placements, &motions);
         stages.atlas = lap();
@@ -317,7 +313,7 @@ impl Pipeline {
         viewer: Viewer,
     ) -> Result<u32, GpuError> {
         let visible = (placed.visible.iter())
-            .filter_map(|visible| Some((visible.patch, visible.block?, visible.pixels)));
+            .filter_map(|visible| Some((visible.patch, visible.slot?, visible.pixels)));
         let patches = &self.scene.patches;
         let mut lit: BTreeMap<PatchId, Job> = BTreeMap::new();
         let mut paths = 0;
@@ -339,7 +335,7 @@ impl Pipeline {
         }
         let mut unlit: BTreeMap<PatchId, Job> = BTreeMap::new();
         for placed in &placed.placements {
-            let job = (self.schedule).job(patches, placed.patch, placed.block, eyes);
+            let job = (self.schedule).job(patches, placed.patch, placed.slot, eyes);
             unlit.insert(placed.patch, job);
         }
         if self.has_sun {

@@ -1,10 +1,10 @@
 //! What the client already knows, and so what an update must tell it.
 
 use shadecast_protocol::{
-    BlockMask, Motion, ObjectId, PatchGeometry, PatchId, Placement, Pose, Vertex, VertexId,
+    Motion, ObjectId, PatchGeometry, PatchId, Placement, Pose, SlotMask, Vertex, VertexId,
 };
 
-use crate::{mask::block_mask, patches::PatchedScene};
+use crate::{mask::slot_mask, patches::PatchedScene};
 
 /// The client's copy of the scene, as far as updates have told it.
 #[derive(Clone, Debug)]
@@ -22,7 +22,7 @@ pub struct News {
     /// New to the client, by ascending id.
     pub patches: Vec<PatchGeometry>,
     /// Of the alpha-masked patches that were placed.
-    pub masks: Vec<BlockMask>,
+    pub masks: Vec<SlotMask>,
     /// Of the objects that move or have just stopped.
     pub motions: Vec<(ObjectId, Motion)>,
 }
@@ -51,7 +51,7 @@ impl Known {
             let PatchId(id) = placement.patch;
             let patch = &scene.patches[id as usize];
             if patch.masked {
-                news.masks.push(block_mask(&scene.scene, patch, *placement));
+                news.masks.push(slot_mask(&scene.scene, patch, *placement));
             }
             if std::mem::replace(&mut self.patches[id as usize], true) {
                 continue;

@@ -10,11 +10,13 @@ mod gpu;
 mod known;
 mod light;
 mod mask;
+mod packer;
 pub mod patches;
 mod picture;
 pub mod scene;
 mod session;
 pub mod still;
+mod tss;
 mod visibility;
 
 /// What kernels of other crates need to read the same scene and follow the same paths.

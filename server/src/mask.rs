@@ -1,30 +1,32 @@
 //! Which texels of an alpha-masked patch are there. Video has no alpha, so the
 //! client gets one bit a texel beside it.
 
-use glam::Vec2;
-use shadecast_protocol::{BlockMask, PatchShape, Placement};
-use shadecast_shaders::light::{patch_point, texel_coordinates};
+use glam::{IVec2, Vec2};
+use shadecast_protocol::{Block, PatchShape, Placement, Slot, SlotMask};
+use shadecast_shaders::light::{AtlasTriangle, PatchPoint, patch_point, texel_coordinates};
 
 use crate::{
     patches::Patch,
     scene::{Alpha, Image, Material, Scene, TextureRef, Wrap},
 };
 
-/// The mask of a patch at the texel centres of its block.
-pub(crate) fn block_mask(scene: &Scene, patch: &Patch, placement: Placement) -> BlockMask {
-    let shape = match patch.shape {
-        PatchShape::Solo => 0,
-        PatchShape::Pair => 1,
-        PatchShape::Triple => 2,
+/// The mask of a patch at the texel centres of its slot.
+pub(crate) fn slot_mask(scene: &Scene, patch: &Patch, placement: Placement) -> SlotMask {
+    let bounds = placement.slot.bounds();
+    let mut bits = vec![0; (bounds.area() as usize).div_ceil(8)];
+    let triangle = match placement.slot {
+        Slot::Triangle(slot) => Some(AtlasTriangle::new(slot.corners, slot.weights)),
+        Slot::Block(_) => None,
     };
-    let level = placement.block.level;
-    let (width, height) = level.size();
-    let mut bits = vec![0; ((width * height) as usize).div_ceil(8)];
-    for y in 0..height {
-        for x in 0..width {
-            let [u, v] = level.turn(texel_coordinates(x, y, width, height).to_array());
-            let point = patch_point(shape, Vec2::new(u, v));
-            let index = (y * width + x) as usize;
+    for y in 0..bounds.height {
+        for x in 0..bounds.width {
+            let texel = IVec2::new(x as i32, y as i32);
+            let point = match (placement.slot, &triangle) {
+                (Slot::Block(block), _) => point_in_block(patch.shape, block, [x, y]),
+                (_, Some(triangle)) if triangle.owns(texel) => triangle.point_of_texel(texel),
+                _ => continue,
+            };
+            let index = (y * bounds.width + x) as usize;
             if is_there(
                 scene,
                 (patch.first_triangle + point.triangle) as usize,
@@ -34,10 +36,21 @@ pub(crate) fn block_mask(scene: &Scene, patch: &Patch, placement: Placement) -> 
             }
         }
     }
-    BlockMask {
+    SlotMask {
         patch: placement.patch,
         bits,
     }
+}
+
+fn point_in_block(shape: PatchShape, block: Block, [x, y]: [u32; 2]) -> PatchPoint {
+    let shape = match shape {
+        PatchShape::Solo => 0,
+        PatchShape::Pair => 1,
+        PatchShape::Triple => 2,
+    };
+    let (width, height) = block.level.size();
+    let coordinates = texel_coordinates(x, y, width, height).to_array();
+    patch_point(shape, Vec2::from(block.level.turn(coordinates)))
 }
 
 /// Twin of `is_there` in `trace.wgsl`.

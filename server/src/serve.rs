@@ -67,7 +67,7 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
         // Sharp walls at one's nose are not worth drawing many times the scene.
         limits.most_triangles = FEW_TRIANGLES.max(scene.triangles.len() * 2);
     }
-    let patched = patches::cut(scene, limits);
+    let patched = patches::cut_for(arguments.method, scene, limits);
     status.print(&patched.report.to_string());
     let spawn = patched.scene.place_to_stand();
 
@@ -108,6 +108,7 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
         secret: network.line.secret,
         welcome: Welcome {
             codec: Codec::H264,
+            method: arguments.method,
             atlas_size: [side, side],
             superblock,
             world_from_play: spawn,

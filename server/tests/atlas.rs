@@ -97,11 +97,10 @@ fn an_idr_picture_shows_nothing_of_blocks_that_are_gone() {
     let lit_outside = |frame: &Frame| {
         let mut luma = luma.lock().expect("no panic holds it").clone();
         for placement in &frame.update.placements {
-            let (width, height) = placement.block.level.size();
-            for y in 0..height as usize {
-                let row = (usize::from(placement.block.y) + y) * usize::from(ATLAS);
-                let at = row + usize::from(placement.block.x);
-                luma[at..at + width as usize].fill(EMPTY);
+            let bounds = placement.slot.bounds();
+            for y in bounds.y..bounds.y + bounds.height {
+                let at = (y * u32::from(ATLAS) + bounds.x) as usize;
+                luma[at..at + bounds.width as usize].fill(EMPTY);
             }
         }
         luma.iter()
@@ -150,10 +149,7 @@ fn a_budget_beyond_a_path_a_texel_is_spent_too() {
     let first = lit_frame(&mut pipeline, 0, 0.0, true, budget);
     let placements = first.update.placements.iter();
     let texels: u32 = placements
-        .map(|placement| {
-            let (width, height) = placement.block.level.size();
-            width * height
-        })
+        .map(|placement| placement.slot.bounds().area())
         .sum();
     assert!(texels < budget / 2, "{texels}");
     assert!(first.stats.paths > budget / 8 * 7, "{}", first.stats.paths);

@@ -4,7 +4,7 @@ use std::mem::{offset_of, size_of};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::{atlas, light, picture, visibility};
+use crate::{atlas, light, picture, tss, visibility};
 
 fn module(name: &str, source: &str) -> naga::Module {
     let module = naga::front::wgsl::parse_str(source)
@@ -56,10 +56,14 @@ fn kernels_validate() {
         ("advance", light::ADVANCE_SOURCE),
         ("atlas", light::ATLAS_SOURCE),
         ("still", light::STILL_SOURCE),
+        ("atlas of triangles", light::ATLAS_OF_TRIANGLES_SOURCE),
         ("carry", light::CARRY_SOURCE),
+        ("carry triangles", light::CARRY_TRIANGLES_SOURCE),
         ("picture", picture::SOURCE),
         ("atlas memory", atlas::SOURCE),
         ("footprint", atlas::FOOTPRINT_SOURCE),
+        ("tss", tss::SOURCE),
+        ("measure", tss::MEASURE_SOURCE),
         ("ids", visibility::IDS_SOURCE),
         ("mark", visibility::MARK_SOURCE),
     ] {
@@ -156,7 +160,7 @@ fn layouts_match() {
         &atlas,
         LightParameters,
         eye,
-        block_count,
+        slot_count,
         atlas_width,
         seed,
         pixel_angle,
@@ -173,6 +177,20 @@ fn layouts_match() {
         patch_id,
         longest_history,
         glossy_keep
+    );
+    let of_triangles = module("atlas of triangles", ATLAS_OF_TRIANGLES_SOURCE);
+    same_layout!(
+        &of_triangles,
+        TriangleRecord,
+        first_job,
+        layout_bits,
+        first_triangle,
+        sample_index,
+        patch_id,
+        longest_history,
+        glossy_keep,
+        corners,
+        weights
     );
     same_layout!(&atlas, Wave, path_count, first_job, cull, step);
     assert_eq!(u64::from(members(&atlas, "PathState").0), STATE_BYTES);
@@ -191,6 +209,25 @@ fn layouts_match() {
     );
     let carry = module("carry", CARRY_SOURCE);
     same_layout!(&carry, Move, to, levels, origin, padding);
+    let carry_triangles = module("carry triangles", CARRY_TRIANGLES_SOURCE);
+    same_layout!(
+        &carry_triangles,
+        TriangleMove,
+        to,
+        to_weights,
+        origin,
+        origin_weights,
+        how,
+        offset_x,
+        offset_y
+    );
+    same_layout!(
+        &carry_triangles,
+        CarryParameters,
+        move_count,
+        atlas_width,
+        padding
+    );
     same_layout!(&carry, CarryParameters, move_count, atlas_width, padding);
     let planes = module("picture", crate::picture::SOURCE);
     same_layout!(&planes, PictureParameters, size, exposure, padding);
@@ -248,6 +285,48 @@ fn layouts_of_the_atlas_match() {
         FootprintParameters,
         patch_count,
         pixels_per_radian,
+        padding
+    );
+}
+
+#[test]
+fn layouts_of_tss_match() {
+    use tss::{ActiveTriangle, CellPlace, MeasureParameters, TssParameters, TssState};
+    let packing = module("tss", tss::SOURCE);
+    same_layout!(
+        &packing,
+        TssParameters,
+        patch_count,
+        width,
+        height,
+        most_class,
+        keep_unseen,
+        padding_0,
+        padding_1,
+        padding_2
+    );
+    same_layout!(
+        &packing,
+        TssState,
+        active_count,
+        seen,
+        steps,
+        evict,
+        placing,
+        status,
+        used_texels,
+        padding
+    );
+    same_layout!(&packing, ActiveTriangle, patch_id, pixels, corners, weights);
+    same_layout!(&packing, CellPlace, start, in_shelf, first, next_y);
+    assert_eq!(u64::from(members(&packing, "Tally").0), tss::TALLY_BYTES);
+    let measure = module("measure", tss::MEASURE_SOURCE);
+    same_layout!(
+        &measure,
+        MeasureParameters,
+        patch_count,
+        pixels_per_radian,
+        keep_unseen,
         padding
     );
 }

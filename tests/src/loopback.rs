@@ -9,8 +9,8 @@ use shadecast_client::{
     SessionConfig as ClientConfig,
 };
 use shadecast_protocol::{
-    ClientTime, ClockReply, Codec, EyeView, Fov, FrameId, Motion, Pose, Secret, ServerTime, Sky,
-    ToClient, ToServer, ViewReport, Welcome,
+    ClientTime, ClockReply, Codec, EyeView, Fov, FrameId, Method, Motion, Pose, Secret, ServerTime,
+    Sky, ToClient, ToServer, ViewReport, Welcome,
 };
 use shadecast_server::{
     Frame, Gpu, GpuScene, Integrator, Pipeline, Session as Server, SessionConfig as ServerConfig,
@@ -73,7 +73,16 @@ impl Loopback {
     /// # Errors
     /// When there is no GPU or the scene does not fit it.
     pub fn new(scene: Scene, seed: u64) -> anyhow::Result<Self> {
-        let patched = patches::cut(scene, PatchLimits::for_atlas(SUPERBLOCK, 165.0));
+        Self::by(Method::Sas, scene, seed)
+    }
+
+    /// The same by another method.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn by(method: Method, scene: Scene, seed: u64) -> anyhow::Result<Self> {
+        let limits = PatchLimits::for_atlas(SUPERBLOCK, 165.0);
+        let patched = patches::cut_for(method, scene, limits);
         let spawn = patched.scene.spawn.unwrap_or(Pose::IDENTITY);
         let gpu = Gpu::open()?;
         let gpu_scene = GpuScene::new(
@@ -96,6 +105,7 @@ impl Loopback {
             secret: SECRET,
             welcome: Welcome {
                 codec: Codec::H264,
+                method,
                 atlas_size: ATLAS_SIZE,
                 superblock: SUPERBLOCK,
                 world_from_play: spawn,

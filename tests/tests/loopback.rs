@@ -5,14 +5,14 @@ use std::time::Duration;
 use shadecast_client::{
     AccessUnit, ClientTiming, DecodedPicture, Decoder, OpenH264Decoder, Ticket, World,
 };
-use shadecast_protocol::{FrameId, Picture, ToClient, Update};
+use shadecast_protocol::{FrameId, Method, Picture, ToClient, Update};
 use shadecast_server::scene::courtyard;
 use shadecast_tests::{ATLAS_SIZE, DELAY, JITTER, Loopback, MAKING};
 
 const FRAMES: usize = 12;
 
-fn run(seed: u64, lost: Option<FrameId>) -> Loopback {
-    let mut loopback = Loopback::new(courtyard(10_000), seed).expect("a GPU");
+fn run(method: Method, seed: u64, lost: Option<FrameId>) -> Loopback {
+    let mut loopback = Loopback::by(method, courtyard(10_000), seed).expect("a GPU");
     if let Some(frame) = lost {
         loopback.lose_picture(frame);
     }
@@ -25,11 +25,27 @@ fn run(seed: u64, lost: Option<FrameId>) -> Loopback {
 #[test]
 #[ignore = "needs a Vulkan driver"]
 fn frames_take_effect_whole_and_a_seed_is_a_run() {
-    let first = run(1, None);
-    picture_and_update_take_effect_together(&first);
+    let first = run(Method::Sas, 1, None);
+    picture_and_update_take_effect_together(Method::Sas, &first);
     both_ends_measure_the_network(&first);
 
-    let second = run(1, None);
+    let second = run(Method::Sas, 1, None);
+    runs_are_the_same(&first, &second);
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn triangles_by_themselves_take_the_same_way() {
+    let first = run(Method::Tss, 1, None);
+    picture_and_update_take_effect_together(Method::Tss, &first);
+    let shown = first.presented().last().expect("frames");
+    assert!(shown.foreshortened);
+    let second = run(Method::Tss, 1, None);
+    runs_are_the_same(&first, &second);
+}
+
+/// Byte for byte.
+fn runs_are_the_same(first: &Loopback, second: &Loopback) {
     assert_eq!(first.sent().len(), second.sent().len());
     for (index, (one, other)) in first.sent().iter().zip(second.sent()).enumerate() {
         let message = ToClient::decode(one).expect("a message");
@@ -41,8 +57,8 @@ fn frames_take_effect_whole_and_a_seed_is_a_run() {
 #[ignore = "needs a Vulkan driver"]
 fn after_a_lost_picture_a_new_epoch_is_shown_whole() {
     let lost = FrameId(4);
-    let loopback = run(2, Some(lost));
-    picture_and_update_take_effect_together(&loopback);
+    let loopback = run(Method::Sas, 2, Some(lost));
+    picture_and_update_take_effect_together(Method::Sas, &loopback);
     let (before, after): (Vec<_>, Vec<_>) = loopback
         .presented()
         .iter()
@@ -54,10 +70,10 @@ fn after_a_lost_picture_a_new_epoch_is_shown_whole() {
 
 /// What is shown is the picture of a frame and the world after its update, and
 /// never those of two frames.
-fn picture_and_update_take_effect_together(loopback: &Loopback) {
+fn picture_and_update_take_effect_together(method: Method, loopback: &Loopback) {
     let (updates, pictures) = frames_sent(loopback);
     let mut decoder = OpenH264Decoder::new();
-    let mut world = World::new(ATLAS_SIZE);
+    let mut world = World::new(ATLAS_SIZE, method);
     let mut shown = loopback.presented().iter().peekable();
     for (update, picture) in updates.iter().zip(&pictures) {
         let frame = update.frame;

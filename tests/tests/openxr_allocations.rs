@@ -14,7 +14,7 @@ use shadecast_client::render::vulkan::{DirectHost, Extras, VulkanGpu};
 use shadecast_client::render::{EyeCamera, EyeImages, Renderer, RendererConfig, frame_channel};
 use shadecast_client::{ClientFrame, ClientTiming, DecodedPicture, DrawVertex, YuvPicture};
 use shadecast_protocol::{
-    ClientTime, Codec, Epoch, Fov, FrameId, Motion, Pose, Sky, UpdateTiming, Welcome,
+    ClientTime, Codec, Epoch, Fov, FrameId, Method, Motion, Pose, Sky, UpdateTiming, Welcome,
 };
 use shadecast_simulated_runtime::{Controller, Runtime, Script, on_crossing};
 
@@ -87,7 +87,7 @@ fn frame() -> ClientFrame {
     let vertices = corners.map(|(x, y)| DrawVertex {
         position: [x, y, -2.0],
         object: 0,
-        texel: [8.0, 8.0],
+        texel: [8.0, 8.0, 1.0],
     });
     ClientFrame {
         frame: FrameId(1),
@@ -99,6 +99,7 @@ fn frame() -> ClientFrame {
         vertices: Arc::new(vertices.to_vec()),
         indices: Arc::new(vec![0, 1, 2]),
         opaque_indices: 3,
+        foreshortened: false,
         objects_lead: 0,
         motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),
         picture: DecodedPicture::from(YuvPicture {
@@ -129,6 +130,7 @@ fn of_a_turn() -> u64 {
         .expect("the headset opens");
     headset.welcome(&Welcome {
         codec: Codec::H264,
+        method: Method::Sas,
         atlas_size: [64; 2],
         superblock: 16,
         world_from_play: Pose::IDENTITY,

@@ -7,8 +7,8 @@ use std::{future::Future, net::SocketAddr, time::Duration};
 
 use glam::Vec3;
 use shadecast_protocol::{
-    ClientTime, Codec, Epoch, EyeView, Fov, FrameId, Hello, Picture, Pose, Secret, Sky, ToServer,
-    Update, UpdateTiming, ViewReport, ViewSeq, Welcome,
+    ClientTime, Codec, Epoch, EyeView, Fov, FrameId, Hello, Method, Picture, Pose, Secret, Sky,
+    ToServer, Update, UpdateTiming, ViewReport, ViewSeq, Welcome,
 };
 use tokio::time::timeout;
 
@@ -55,6 +55,7 @@ fn hello_with(secret: Secret) -> ToServer {
 fn welcome() -> Welcome {
     Welcome {
         codec: Codec::H264,
+        method: Method::Sas,
         atlas_size: [512, 512],
         superblock: 64,
         world_from_play: Pose::IDENTITY,

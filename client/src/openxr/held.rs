@@ -92,7 +92,7 @@ impl Held {
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
-    use shadecast_protocol::Codec;
+    use shadecast_protocol::{Codec, Method};
 
     use super::*;
     use crate::render::frame_channel;
@@ -100,6 +100,7 @@ mod tests {
     fn welcome(x: f32) -> Welcome {
         Welcome {
             codec: Codec::H264,
+            method: Method::Sas,
             atlas_size: [64; 2],
             superblock: 8,
             world_from_play: Pose {

@@ -14,6 +14,7 @@ pub(super) struct Mesh {
     indices: Uploaded<u32>,
     /// How many of the indices, from the first on, need no mask.
     opaque_indices: u32,
+    foreshortened: bool,
     transforms: GrowingBuffer,
     motions: Arc<Vec<Motion>>,
 }
@@ -24,6 +25,7 @@ impl Mesh {
             vertices: Uploaded::new("vertices", wgpu::BufferUsages::VERTEX),
             indices: Uploaded::new("indices", wgpu::BufferUsages::INDEX),
             opaque_indices: 0,
+            foreshortened: false,
             transforms: GrowingBuffer::new("transforms", wgpu::BufferUsages::STORAGE),
             motions: Arc::default(),
         }
@@ -52,6 +54,7 @@ impl Mesh {
         self.vertices.upload(device, queue, &frame.vertices);
         self.indices.upload(device, queue, &frame.indices);
         self.opaque_indices = frame.opaque_indices.min(self.indices.count());
+        self.foreshortened = frame.foreshortened;
         self.motions = Arc::clone(&frame.motions);
         if !self.moves() {
             return false;
@@ -78,6 +81,11 @@ impl Mesh {
     /// True when there is more than the world that stands still.
     pub(super) fn moves(&self) -> bool {
         self.motions.len() > 1
+    }
+
+    /// Whether lookups must divide.
+    pub(super) fn is_foreshortened(&self) -> bool {
+        self.foreshortened
     }
 
     pub(super) fn transforms(&self) -> Option<&wgpu::Buffer> {

@@ -109,6 +109,8 @@ pub(super) struct Needs {
     pub(super) objects: bool,
     /// Masks.
     pub(super) mask: bool,
+    /// Texels unevenly spaced on their triangles.
+    pub(super) foreshortened: bool,
 }
 
 /// Builds pipelines and keeps those that have been needed.
@@ -178,9 +180,10 @@ impl Pipelines {
                 buffers: &[wgpu::VertexBufferLayout {
                     array_stride: size_of::<DrawVertex>() as u64,
                     step_mode: wgpu::VertexStepMode::Vertex,
-                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Uint32, 2 => Float32x2],
+                    attributes: &wgpu::vertex_attr_array![0 => Float32x3, 1 => Uint32, 2 => Float32x3],
                 }],
                 fragment: if needs.mask { "masked" } else { "opaque" },
+                constants: &[("FORESHORTENED", f64::from(u8::from(needs.foreshortened)))],
                 topology: wgpu::PrimitiveTopology::TriangleList,
                 cull: Some(wgpu::Face::Back),
                 blend: None,
@@ -199,6 +202,7 @@ impl Pipelines {
                 vertex: "vertex_sky",
                 buffers: &[],
                 fragment: "sky",
+                constants: &[],
                 topology: wgpu::PrimitiveTopology::TriangleList,
                 cull: None,
                 blend: None,
@@ -219,6 +223,7 @@ impl Pipelines {
                 vertex: "vertex_notice",
                 buffers: &[],
                 fragment: "notice",
+                constants: &[],
                 topology: wgpu::PrimitiveTopology::TriangleStrip,
                 cull: None,
                 blend: Some(wgpu::BlendState::ALPHA_BLENDING),
@@ -246,7 +251,10 @@ impl Pipelines {
             fragment: Some(wgpu::FragmentState {
                 module: &self.module,
                 entry_point: Some(parts.fragment),
-                compilation_options: wgpu::PipelineCompilationOptions::default(),
+                compilation_options: wgpu::PipelineCompilationOptions {
+                    constants: parts.constants,
+                    ..wgpu::PipelineCompilationOptions::default()
+                },
                 targets: &[Some(wgpu::ColorTargetState {
                     blend: parts.blend,
                     ..self.eye_format.into()
@@ -279,6 +287,8 @@ struct Parts<'a> {
     vertex: &'a str,
     buffers: &'a [wgpu::VertexBufferLayout<'a>],
     fragment: &'a str,
+    /// Overrides of the fragment stage.
+    constants: &'a [(&'a str, f64)],
     topology: wgpu::PrimitiveTopology,
     cull: Option<wgpu::Face>,
     blend: Option<wgpu::BlendState>,

@@ -331,10 +331,15 @@ impl Renderer {
     /// Of the draw calls that the frame takes: at most two.
     fn needs(&self) -> impl Iterator<Item = Needs> + use<> {
         let objects = self.mesh.moves();
+        let foreshortened = self.mesh.is_foreshortened();
         let has_masks = self.atlas.mask_group().is_some();
         let needed = [false, true].map(|mask| {
             let drawn = !self.mesh.range(mask).is_empty() && (has_masks || !mask);
-            drawn.then_some(Needs { objects, mask })
+            drawn.then_some(Needs {
+                objects,
+                mask,
+                foreshortened,
+            })
         });
         needed.into_iter().flatten()
     }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use shadecast_protocol::{
-    ClientTime, Epoch, FrameId, Picture, ResetReason, ToServer, Update, UpdateTiming,
+    ClientTime, Epoch, FrameId, Method, Picture, ResetReason, ToServer, Update, UpdateTiming,
 };
 
 use super::inbox::Inbox;
@@ -96,11 +96,11 @@ enum Missing {
 }
 
 impl Stream {
-    pub(super) fn new(connection: u32, atlas_size: [u16; 2]) -> Self {
+    pub(super) fn new(connection: u32, atlas_size: [u16; 2], method: Method) -> Self {
         Self {
             connection,
             atlas_size,
-            world: World::new(atlas_size),
+            world: World::new(atlas_size, method),
             pictures: Inbox::new(),
             updates: Inbox::new(),
             in_flight: VecDeque::new(),

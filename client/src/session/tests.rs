@@ -5,7 +5,9 @@ mod recovery;
 mod server;
 
 use glam::Vec3;
-use shadecast_protocol::{ClockReply, EyeView, Fov, Pose, ResetReason, ServerTime, Sky, WireError};
+use shadecast_protocol::{
+    ClockReply, EyeView, Fov, Method, Pose, ResetReason, ServerTime, Sky, WireError,
+};
 
 use super::*;
 use crate::{DecodeError, Ticket, YuvPicture};
@@ -86,6 +88,7 @@ impl Client {
 fn welcome() -> Welcome {
     Welcome {
         codec: Codec::H264,
+        method: Method::Sas,
         atlas_size: server::ATLAS,
         superblock: 64,
         world_from_play: Pose::IDENTITY,

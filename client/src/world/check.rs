@@ -1,7 +1,8 @@
 //! Whether an update fits the world, asked before any of it is taken.
 
 use shadecast_protocol::{
-    Block, Epoch, MAX_PATCHES, MAX_VERTICES, ObjectId, PatchId, Placement, Update, VertexId,
+    Epoch, MAX_PATCHES, MAX_VERTICES, Method, ObjectId, PatchId, PatchShape, Placement, Slot,
+    Update, VertexId,
 };
 use thiserror::Error;
 
@@ -50,23 +51,34 @@ pub enum WorldError {
     /// A patch is placed that was never sent.
     #[error("the unknown patch {} is placed", .0.0)]
     UnknownPatch(PatchId),
-    /// A patch is removed that has no block.
-    #[error("patch {} is removed but has no block", .0.0)]
+    /// A patch is removed that has no slot.
+    #[error("patch {} is removed but has no slot", .0.0)]
     NotPlaced(PatchId),
-    /// A block does not lie in the atlas.
-    #[error("the block of patch {} lies outside the atlas", .0.0)]
-    BlockOutside(PatchId),
+    /// A slot does not lie in the atlas.
+    #[error("the slot of patch {} lies outside the atlas", .0.0)]
+    SlotOutside(PatchId),
+    /// A slot is not of the kind that the session's method has.
+    #[error("patch {} has a slot that {} does not give", patch.0, method.name())]
+    SlotKind {
+        /// The patch.
+        patch: PatchId,
+        /// The session's.
+        method: Method,
+    },
+    /// A patch of several triangles has the slot of one.
+    #[error("patch {} has several triangles and the slot of one", .0.0)]
+    SlotOfOneTriangle(PatchId),
     /// A mask belongs to a patch that the update does not place.
     #[error("the update has a mask for patch {}, which it does not place", .0.0)]
     MaskWithoutPlacement(PatchId),
-    /// A mask is not as large as its block.
+    /// A mask is not as large as its slot.
     #[error("the mask of patch {} has {bytes} bytes instead of {expected}", patch.0)]
     MaskSize {
         /// The patch.
         patch: PatchId,
         /// Its mask's bytes.
         bytes: usize,
-        /// What its block asks for.
+        /// What its slot asks for.
         expected: usize,
     },
     /// Something moves the world that stands still.
@@ -138,13 +150,24 @@ impl World {
                 return Err(WorldError::NotPlaced(patch));
             }
         }
-        for &Placement { patch, block } in &update.placements {
-            let is_new = || update.patches.binary_search_by_key(&patch, |new| new.id);
-            if !self.patches.contains_key(&patch) && is_new().is_err() {
+        for &Placement { patch, slot } in &update.placements {
+            let known = self.patches.get(&patch).map(|patch| patch.shape);
+            let new = || {
+                let index = update.patches.binary_search_by_key(&patch, |new| new.id);
+                index.ok().map(|index| update.patches[index].shape)
+            };
+            let Some(shape) = known.or_else(new) else {
                 return Err(WorldError::UnknownPatch(patch));
+            };
+            if !self.method.places(slot) {
+                let method = self.method;
+                return Err(WorldError::SlotKind { patch, method });
             }
-            if !lies_in(block, self.atlas_size) {
-                return Err(WorldError::BlockOutside(patch));
+            if matches!(slot, Slot::Triangle(_)) && shape != PatchShape::Solo {
+                return Err(WorldError::SlotOfOneTriangle(patch));
+            }
+            if !lies_in(slot, self.atlas_size) {
+                return Err(WorldError::SlotOutside(patch));
             }
         }
         for mask in &update.masks {
@@ -154,7 +177,7 @@ impl World {
             else {
                 return Err(WorldError::MaskWithoutPlacement(mask.patch));
             };
-            let area = update.placements[index].block.level.area() as usize;
+            let area = update.placements[index].slot.bounds().area() as usize;
             let expected = area.div_ceil(8);
             if mask.bits.len() != expected {
                 return Err(WorldError::MaskSize {
@@ -182,12 +205,15 @@ fn within_limit(what: &'static str, count: usize, limit: u32) -> Result<(), Worl
         .ok_or(WorldError::TooMany { what, limit })
 }
 
-fn lies_in(block: Block, atlas_size: [u16; 2]) -> bool {
-    let lies_on = |start: u16, log2_side: u8, side: u16| {
-        let length = 1_u32.checked_shl(u32::from(log2_side));
-        let end = length.and_then(|length| length.checked_add(u32::from(start)));
-        end.is_some_and(|end| end <= u32::from(side))
+fn lies_in(slot: Slot, atlas_size: [u16; 2]) -> bool {
+    // A level that nobody checked may stand for any number of texels.
+    let is_small = match slot {
+        Slot::Block(block) => block.level.width < 16 && block.level.height < 16,
+        Slot::Triangle(_) => true,
     };
-    let level = block.level.landscape();
-    lies_on(block.x, level.width, atlas_size[0]) && lies_on(block.y, level.height, atlas_size[1])
+    is_small && {
+        let bounds = slot.bounds();
+        let [width, height] = atlas_size.map(u32::from);
+        bounds.x + bounds.width <= width && bounds.y + bounds.height <= height
+    }
 }

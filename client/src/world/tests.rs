@@ -7,8 +7,8 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use proptest::prelude::*;
 use shadecast_protocol::{
-    BlockMask, ClientTime, FrameId, Level, MAX_VERTICES, Motion, PatchGeometry, PatchShape,
-    Placement, ServerTime, UpdateTiming, Vertex,
+    Block, ClientTime, FrameId, Level, MAX_VERTICES, Motion, PatchGeometry, PatchShape, Placement,
+    ServerTime, SlotMask, TriangleSlot, UpdateTiming, Vertex,
 };
 
 use super::*;
@@ -57,7 +57,7 @@ fn placement(id: u32, x: u16, y: u16, log2: [u8; 2]) -> Placement {
     };
     Placement {
         patch: PatchId(id),
-        block: Block { x, y, level },
+        slot: Slot::Block(Block { x, y, level }),
     }
 }
 
@@ -79,7 +79,7 @@ fn three_patches() -> Update {
 }
 
 fn world() -> World {
-    let mut world = World::new([64, 64]);
+    let mut world = World::new([64, 64], Method::Sas);
     world.apply(&three_patches()).unwrap();
     world
 }
@@ -98,10 +98,17 @@ fn frame(world: &mut World) -> ClientFrame {
     world.frame(&update(1), picture(), ClientTiming::default())
 }
 
+/// Texel coordinates of a corner in a block.
+fn texel(vertex: &DrawVertex) -> [f32; 2] {
+    let [x, y, w] = vertex.texel;
+    assert_eq!(w, 1.0);
+    [x, y]
+}
+
 #[test]
 fn corners_lie_on_texel_centres_of_their_block() {
     let frame = frame(&mut world());
-    let texels: Vec<_> = frame.vertices.iter().map(|vertex| vertex.texel).collect();
+    let texels: Vec<_> = frame.vertices.iter().map(texel).collect();
     let expected = [
         // Solo in 8x4 at (0, 0).
         [0.5, 0.5],
@@ -140,10 +147,67 @@ fn an_upright_patch_lies_on_its_side() {
     };
     world.apply(&update).unwrap();
     let frame = frame(&mut world);
-    let texels: Vec<_> = frame.vertices[3..7].iter().map(|v| v.texel).collect();
+    let texels: Vec<_> = frame.vertices[3..7].iter().map(texel).collect();
     assert_eq!(
         texels,
         [[8.5, 16.5], [8.5, 17.5], [15.5, 17.5], [15.5, 16.5]]
+    );
+}
+
+/// A world of triangles by themselves, with two of them in each other's bounds.
+fn world_of_triangles() -> World {
+    let mut world = World::new([64, 64], Method::Tss);
+    let slot = |patch: u32, corners, weights| Placement {
+        patch: PatchId(patch),
+        slot: Slot::Triangle(TriangleSlot { corners, weights }),
+    };
+    let update = Update {
+        vertices: [10, 11, 12, 20, 21, 22].map(vertex).to_vec(),
+        patches: vec![patch(1, PatchShape::Solo), patch(2, PatchShape::Solo)],
+        placements: vec![
+            slot(1, [[4, 4], [28, 4], [4, 28]], [65535; 3]),
+            slot(2, [[52, 28], [28, 28], [52, 4]], [65535, 13107, 65535]),
+        ],
+        masks: vec![
+            SlotMask {
+                patch: PatchId(1),
+                bits: vec![0, 0],
+            },
+            SlotMask {
+                patch: PatchId(2),
+                bits: vec![0xff, 0xff],
+            },
+        ],
+        ..update(1)
+    };
+    world.apply(&update).unwrap();
+    world
+}
+
+#[test]
+fn corners_of_a_triangle_slot_are_homogeneous() {
+    let frame = frame(&mut world_of_triangles());
+    let texels: Vec<_> = frame.vertices.iter().map(|vertex| vertex.texel).collect();
+    let expected = [
+        [0.5, 0.5, 1.0],
+        [3.5, 0.5, 1.0],
+        [0.5, 3.5, 1.0],
+        [6.5, 3.5, 1.0],
+        [17.5, 17.5, 5.0],
+        [6.5, 0.5, 1.0],
+    ];
+    assert_eq!(texels, expected);
+    assert!(frame.foreshortened);
+}
+
+#[test]
+fn masks_of_triangles_leave_each_other_alone() {
+    let masks = frame(&mut world_of_triangles()).masks.unwrap();
+    let absent = (0..64 * 64).filter(|&i| masks.coverage[i] == 0).count();
+    assert_eq!(
+        absent,
+        4 + 4 + 3 + 2,
+        "all of the first, none of the second"
     );
 }
 
@@ -157,7 +221,7 @@ fn double_sided_triangles_appear_in_both_windings() {
         placements: vec![placement(7, 0, 0, [1, 1])],
         ..update(0)
     };
-    let mut world = World::new([64, 64]);
+    let mut world = World::new([64, 64], Method::Sas);
     world.apply(&update).unwrap();
     assert_eq!(*frame(&mut world).indices, [0, 1, 2, 0, 2, 1]);
 }
@@ -187,7 +251,7 @@ fn a_new_epoch_drops_placements_and_masks_and_keeps_geometry() {
     let mut world = world();
     let masked = Update {
         placements: vec![placement(2, 8, 0, [1, 1])],
-        masks: vec![BlockMask {
+        masks: vec![SlotMask {
             patch: PatchId(2),
             bits: vec![0b0110],
         }],
@@ -216,7 +280,7 @@ fn masks_cover_their_blocks_and_go_with_them() {
     assert!(frame(&mut world).masks.is_none());
     let masked = Update {
         placements: vec![placement(2, 62, 10, [1, 1])],
-        masks: vec![BlockMask {
+        masks: vec![SlotMask {
             patch: PatchId(2),
             bits: vec![0b0110],
         }],
@@ -338,7 +402,7 @@ proptest! {
             ..update(0)
         };
         let place = |id: u32| placement(id, 2 * id as u16, 4, [1, 1]);
-        let mut world = World::new([64, 64]);
+        let mut world = World::new([64, 64], Method::Sas);
         world.apply(&geometry).unwrap();
         let mut placed = std::collections::BTreeSet::new();
         for (id, is_placed) in steps {
@@ -352,12 +416,10 @@ proptest! {
             world.apply(&step).unwrap();
             let _ = frame(&mut world);
         }
-        let mut at_once = World::new([64, 64]);
+        let mut at_once = World::new([64, 64], Method::Sas);
         let placements = placed.iter().map(|&id| place(id)).collect();
         at_once.apply(&Update { placements, ..geometry }).unwrap();
         let (a, b) = (frame(&mut world), frame(&mut at_once));
-        prop_assert_eq!(a.vertices.iter().map(|v| v.texel).collect::<Vec<_>>(),
-            b.vertices.iter().map(|v| v.texel).collect::<Vec<_>>());
         prop_assert_eq!(&a.vertices, &b.vertices);
         prop_assert_eq!(a.indices, b.indices);
     }
@@ -378,7 +440,7 @@ fn ten_thousand_patches() {
             .collect(),
         ..update(0)
     };
-    let mut world = World::new([2048, 2048]);
+    let mut world = World::new([2048, 2048], Method::Sas);
     let start = std::time::Instant::now();
     world.apply(&all).unwrap();
     let applied = start.elapsed();

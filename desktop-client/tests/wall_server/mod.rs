@@ -10,9 +10,9 @@ use glam::{Quat, Vec3};
 use openh264::encoder::Encoder;
 use openh264::formats::YUVBuffer;
 use shadecast_protocol::{
-    Block, ClientTime, ClockReply, Codec, Epoch, FrameId, Level, ObjectId, PatchGeometry, PatchId,
-    PatchShape, Picture, Placement, Pose, Refusal, ServerTime, Sky, ToClient, ToServer, Update,
-    UpdateTiming, Vertex, VertexId, ViewReport, Welcome,
+    Block, ClientTime, ClockReply, Codec, Epoch, FrameId, Level, Method, ObjectId, PatchGeometry,
+    PatchId, PatchShape, Picture, Placement, Pose, Refusal, ServerTime, Sky, Slot, ToClient,
+    ToServer, Update, UpdateTiming, Vertex, VertexId, ViewReport, Welcome,
 };
 use shadecast_transport::{Identity, Listener, ServerEnd, TransportError};
 
@@ -125,6 +125,7 @@ async fn stream(client: &ServerEnd, mut mishap: Option<Mishap>) -> Result<(), Tr
 fn welcome() -> Welcome {
     Welcome {
         codec: Codec::H264,
+        method: Method::Sas,
         atlas_size: [1 << LOG2_SIDE; 2],
         superblock: 1 << LOG2_SIDE,
         world_from_play: Pose::IDENTITY,
@@ -180,14 +181,14 @@ fn update(frame: FrameId, view: Option<(ViewReport, ServerTime)>, now: ServerTim
         }];
         update.placements = vec![Placement {
             patch: PatchId(0),
-            block: Block {
+            slot: Slot::Block(Block {
                 x: 0,
                 y: 0,
                 level: Level {
                     width: LOG2_SIDE,
                     height: LOG2_SIDE,
                 },
-            },
+            }),
         }];
     }
     update

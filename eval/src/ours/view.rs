@@ -3,14 +3,14 @@
 use anyhow::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec3};
-use shadecast_protocol::{Epoch, PatchShape, Pose, Update};
+use shadecast_protocol::{Epoch, PatchShape, Pose, Slot, Update};
 use shadecast_server::{
     Pipeline,
     kernels::{Binding, bind, layout, workgroups},
     patches::PatchedScene,
     still::Still,
 };
-use shadecast_shaders::light::{ADVANCE_SOURCE, rows_of_affine};
+use shadecast_shaders::light::{ADVANCE_SOURCE, TRIANGLE_SOURCE, rows_of_affine};
 use wgpu::ShaderStages;
 
 #[repr(C)]
@@ -29,12 +29,15 @@ struct Home {
     position: u32,
     layout_bits: u32,
     first_triangle: u32,
-    padding: u32,
+    corners: [u32; 3],
+    weights: [u32; 2],
 }
 
 const NOWHERE: u32 = u32::MAX;
+/// In `Home::layout_bits`: a triangle's slot.
+const TRIANGLE: u32 = 1 << 15;
 
-/// The blocks of an atlas as its updates tell of them, and the kernel that looks
+/// The slots of an atlas as its updates tell of them, and the kernel that looks
 /// at the scene through them.
 #[derive(Debug)]
 pub(super) struct AtlasView {
@@ -62,7 +65,7 @@ impl AtlasView {
                 position: NOWHERE,
                 layout_bits: 0,
                 first_triangle: patch.first_triangle,
-                padding: 0,
+                ..Home::zeroed()
             });
         }
         let nothing = layout(gpu, ShaderStages::COMPUTE, &[]);
@@ -77,7 +80,7 @@ impl AtlasView {
                 Binding::Write,
             ],
         );
-        let source = [ADVANCE_SOURCE, include_str!("view.wgsl")].concat();
+        let source = [ADVANCE_SOURCE, TRIANGLE_SOURCE, include_str!("view.wgsl")].concat();
         let layouts = [&gpu_scene.layout, &nothing, &own];
         Ok(Self {
             atlas_width: u32::from(atlas_width),
@@ -92,7 +95,7 @@ impl AtlasView {
         })
     }
 
-    /// Takes in what an update says of blocks.
+    /// Takes in what an update says of slots.
     pub(super) fn update(&mut self, pipeline: &Pipeline, update: &Update) {
         let patches = &pipeline.scene().patches;
         if update.epoch != self.epoch {
@@ -105,19 +108,32 @@ impl AtlasView {
             self.homes[patch.0 as usize].position = NOWHERE;
         }
         for placement in &update.placements {
-            let block = placement.block;
-            let level = block.level.landscape();
             let shape = match patches[placement.patch.0 as usize].shape {
                 PatchShape::Solo => 0,
                 PatchShape::Pair => 1,
                 PatchShape::Triple => 2,
             };
             let home = &mut self.homes[placement.patch.0 as usize];
-            home.position = u32::from(block.x) | u32::from(block.y) << 16;
-            home.layout_bits = u32::from(level.width)
-                | u32::from(level.height) << 4
-                | shape << 8
-                | u32::from(block.level.is_turned()) << 14;
+            let packed = |[x, y]: [u16; 2]| u32::from(x) | u32::from(y) << 16;
+            match placement.slot {
+                Slot::Block(block) => {
+                    let level = block.level.landscape();
+                    home.position = packed([block.x, block.y]);
+                    home.layout_bits = u32::from(level.width)
+                        | u32::from(level.height) << 4
+                        | shape << 8
+                        | u32::from(block.level.is_turned()) << 14;
+                }
+                Slot::Triangle(slot) => {
+                    home.position = packed(slot.corners[0]);
+                    home.layout_bits = TRIANGLE;
+                    home.corners = slot.corners.map(packed);
+                    home.weights = [
+                        packed([slot.weights[0], slot.weights[1]]),
+                        slot.weights[2].into(),
+                    ];
+                }
+            }
         }
     }
 

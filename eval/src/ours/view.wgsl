@@ -1,7 +1,8 @@
 // What a client shows of an atlas, before tone curve and video: each pixel's
-// rays meet the geometry and read the block of the patch that they meet.
+// rays meet the geometry and read the slot of the patch that they meet.
 // One thread per pixel; reads `shown` by way of `homes`, writes `seen`.
-// The inverse of `patch_point` in atlas.wgsl.
+// The inverse of `surface_point` in block_slots.wgsl and triangle_slots.wgsl.
+// Joined with triangle.wgsl.
 
 struct ViewParameters {
     world_from_eye: mat3x4<f32>,
@@ -16,11 +17,15 @@ struct ViewParameters {
 struct Home {
     // x | y << 16 of the block, or NONE.
     position: u32,
-    // log2 width | log2 height << 4 | shape << 8 | turned << 14
+    // log2 width | log2 height << 4 | shape << 8 | turned << 14, or TRIANGLE.
     layout_bits: u32,
     first_triangle: u32,
-    padding: u32,
+    // Of a triangle: see `atlas_triangle`.
+    corners: array<u32, 3>,
+    weights: array<u32, 2>,
 }
+
+const TRIANGLE: u32 = 1u << 15u;
 
 @group(2) @binding(0) var<uniform> view: ViewParameters;
 @group(2) @binding(1) var<storage, read> homes: array<Home>;
@@ -43,10 +48,29 @@ fn patch_coordinates(shape: u32, triangle: u32, b: vec2<f32>) -> vec2<f32> {
     return b;
 }
 
+// Between four texels, the first of them at `corner`.
+fn between(corner: vec2<u32>, f: vec2<f32>, right: u32, down: u32) -> vec3<f32> {
+    let at = corner.y * view.atlas_width + corner.x;
+    return mix(mix(shown[at].rgb, shown[at + right].rgb, f.x),
+        mix(shown[at + down].rgb, shown[at + down + right].rgb, f.x), f.y);
+}
+
+fn triangle_light(home: Home, b: vec2<f32>) -> vec3<f32> {
+    let slot = atlas_triangle(home.corners, home.weights);
+    let q = max(texel_at(slot, in_atlas(slot, vec3<f32>(1.0 - b.x - b.y, b))), vec2<f32>(0.0));
+    let low = min(vec2<u32>(q), slot.size - 1u);
+    let last = low == slot.size - 1u;
+    return between(slot.corner + low, min(q - vec2<f32>(low), vec2<f32>(1.0)),
+        select(1u, 0u, last.x), select(view.atlas_width, 0u, last.y));
+}
+
 fn texel_light(hit: Hit) -> vec3<f32> {
     let home = homes[patches[hit.triangle]];
     if (home.position == NONE) {
         return vec3<f32>(0.0);
+    }
+    if ((home.layout_bits & TRIANGLE) != 0u) {
+        return triangle_light(home, hit.b);
     }
     let shape = (home.layout_bits >> 8u) & 3u;
     let along_patch = patch_coordinates(shape, hit.triangle - home.first_triangle, hit.b);
@@ -55,11 +79,8 @@ fn texel_light(hit: Hit) -> vec3<f32> {
     let p = clamp(along_block, vec2<f32>(0.0), vec2<f32>(1.0)) * vec2<f32>(size - 1u);
     let low = min(vec2<u32>(p), max(size, vec2<u32>(2u)) - 2u);
     let f = p - vec2<f32>(low);
-    let corner = ((home.position >> 16u) + low.y) * view.atlas_width + (home.position & 0xffffu) + low.x;
-    let right = select(0u, 1u, size.x > 1u);
-    let down = select(0u, view.atlas_width, size.y > 1u);
-    return mix(mix(shown[corner].rgb, shown[corner + right].rgb, f.x),
-        mix(shown[corner + down].rgb, shown[corner + down + right].rgb, f.x), f.y);
+    let corner = vec2<u32>(home.position & 0xffffu, home.position >> 16u) + low;
+    return between(corner, f, select(0u, 1u, size.x > 1u), select(0u, view.atlas_width, size.y > 1u));
 }
 
 @compute @workgroup_size(64)

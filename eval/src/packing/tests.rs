@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use proptest::prelude::*;
-use shadecast_protocol::{Block, PatchId};
+use shadecast_protocol::{Block, PatchId, Slot};
 use shadecast_server::atlas::{AtlasShape, AtlasTwin};
 use shadecast_shaders::atlas::{Memory, Seen, Wish};
 
@@ -45,7 +45,10 @@ fn check<M: Memory>(memory: M, frames: &[Vec<Seen>]) -> AtlasTwin<M> {
         for patch in &placed.removals {
             assert!(known.remove(patch).is_some());
         }
-        known.extend(placed.placements.iter().map(|p| (p.patch, p.block)));
+        known.extend(placed.placements.iter().map(|p| match p.slot {
+            Slot::Block(block) => (p.patch, block),
+            Slot::Triangle(slot) => panic!("{slot:?}"),
+        }));
         let mut taken = vec![false; usize::from(SIDE) * usize::from(SIDE)];
         for block in known.values() {
             let (width, height) = block.level.size();

@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
-    Block, Level, ObjectId, PatchId, Placement, ToClient, Update, Vertex, VertexId,
+    Block, Level, ObjectId, PatchId, Placement, Slot, ToClient, Update, Vertex, VertexId,
 };
 
 use crate::samples;
@@ -50,11 +50,11 @@ fn first_sight() -> Update {
             *index += 1;
             placements.push(Placement {
                 patch: PatchId(id),
-                block: Block {
+                slot: Slot::Block(Block {
                     x: superblock % 32 * 64 + column * width as u16,
                     y: superblock / 32 * 64 + row * height as u16,
                     level,
-                },
+                }),
             });
         }
     }

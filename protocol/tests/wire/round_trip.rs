@@ -5,10 +5,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use glam::{Quat, Vec3};
 use proptest::{array::uniform2, collection::vec, prelude::*, sample::select};
 use shadecast_protocol::{
-    Acknowledgement, Block, BlockMask, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId,
-    Hand, Hello, Level, MAX_PATCHES, MAX_VERTICES, Motion, ObjectId, PatchGeometry, PatchId,
-    PatchShape, Picture, Placement, Pose, Refusal, ResetReason, Secret, ServerTime, Sky, ToClient,
-    ToServer, Update, UpdateTiming, Vertex, VertexId, ViewReport, ViewSeq, Welcome,
+    Acknowledgement, Block, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId, Hand,
+    Hello, Level, MAX_PATCHES, MAX_VERTICES, Method, Motion, ObjectId, PatchGeometry, PatchId,
+    PatchShape, Picture, Placement, Pose, Refusal, ResetReason, Secret, ServerTime, Sky, Slot,
+    SlotMask, ToClient, ToServer, TriangleSlot, Update, UpdateTiming, Vertex, VertexId, ViewReport,
+    ViewSeq, Welcome,
 };
 
 use crate::samples::{to_client, to_server};
@@ -158,21 +159,29 @@ fn welcome() -> impl Strategy<Value = Welcome> {
         rgb: vec![color; 3 * usize::from(width) * usize::from(height)],
     });
     let atlas = uniform2((4..=512_u16).prop_map(|macroblocks| 16 * macroblocks));
-    (atlas, 1..=6_u32, pose(), sky).prop_map(|(atlas_size, log2, world_from_play, sky)| Welcome {
-        codec: Codec::H264,
-        atlas_size,
-        superblock: 1 << log2,
-        world_from_play,
-        sky,
-    })
+    let method = select(Method::ALL.to_vec());
+    (atlas, 1..=6_u32, pose(), sky, method).prop_map(
+        |(atlas_size, log2, world_from_play, sky, method)| Welcome {
+            codec: Codec::H264,
+            method,
+            atlas_size,
+            superblock: 1 << log2,
+            world_from_play,
+            sky,
+        },
+    )
 }
 
 fn update() -> impl Strategy<Value = Update> {
     let vertices = prop::collection::btree_map(0..MAX_VERTICES, point(), 0..60);
     let patches = prop::collection::btree_map(0..MAX_PATCHES, geometry(), 0..60);
     let removals = prop::collection::btree_set(0..MAX_PATCHES, 0..60);
-    let placements =
-        prop::collection::btree_map(0..MAX_PATCHES, (block(), any::<Option<u8>>()), 0..60);
+    let of_one_kind = |slot: BoxedStrategy<Slot>| {
+        prop::collection::btree_map(0..MAX_PATCHES, (slot, any::<Option<u8>>()), 0..60)
+    };
+    let blocks = block().prop_map(Slot::Block).boxed();
+    let triangles = triangle().prop_map(Slot::Triangle).boxed();
+    let placements = prop_oneof![of_one_kind(blocks), of_one_kind(triangles)];
     let motions = prop::collection::btree_map(1..=u16::MAX, motion(), 0..4);
     let head = (any::<[u32; 3]>(), any::<[u64; 6]>(), pose());
     (head, vertices, patches, removals, placements, motions).prop_map(assemble)
@@ -186,7 +195,7 @@ type Parts = (
     BTreeMap<u32, Vec3>,
     BTreeMap<u32, Patch>,
     BTreeSet<u32>,
-    BTreeMap<u32, (Block, Option<u8>)>,
+    BTreeMap<u32, (Slot, Option<u8>)>,
     BTreeMap<u16, Motion>,
 );
 
@@ -197,9 +206,9 @@ fn assemble(parts: Parts) -> Update {
         id: VertexId(id),
         position,
     };
-    let mask = |(&id, &(block, byte)): (&u32, &(Block, Option<u8>))| {
-        let bytes = block.level.area().div_ceil(8) as usize;
-        byte.filter(|_| bytes < 4096).map(|byte| BlockMask {
+    let mask = |(&id, &(slot, byte)): (&u32, &(Slot, Option<u8>))| {
+        let bytes = slot.bounds().area().div_ceil(8) as usize;
+        byte.filter(|_| bytes < 4096).map(|byte| SlotMask {
             patch: PatchId(id),
             bits: vec![byte; bytes],
         })
@@ -223,9 +232,9 @@ fn assemble(parts: Parts) -> Update {
         masks: placements.iter().filter_map(mask).collect(),
         placements: placements
             .into_iter()
-            .map(|(id, (block, _))| Placement {
+            .map(|(id, (slot, _))| Placement {
                 patch: PatchId(id),
-                block,
+                slot,
             })
             .collect(),
         motions: motions
@@ -264,6 +273,20 @@ fn block() -> impl Strategy<Value = Block> {
             x: even(position[0], width),
             y: even(position[1], height),
             level,
+        }
+    })
+}
+
+fn triangle() -> impl Strategy<Value = TriangleSlot> {
+    let place = uniform2(4..=49_000_u16);
+    let corners = prop::array::uniform3(uniform2(0..=8 * 2000_u16));
+    let weights = (uniform2(1..=u16::MAX), 0..3_usize);
+    (place, corners, weights).prop_map(|(place, corners, (smaller, largest))| {
+        let mut weights = [smaller[0], smaller[1], u16::MAX];
+        weights.swap(2, largest);
+        TriangleSlot {
+            corners: corners.map(|corner| [0, 1].map(|axis| place[axis] + corner[axis])),
+            weights,
         }
     })
 }

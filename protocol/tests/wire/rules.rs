@@ -2,7 +2,7 @@
 
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
-    BlockMask, ClientTime, Codec, Hello, Motion, ObjectId, PatchId, Picture, Pose, ServerTime,
+    ClientTime, Codec, Hello, Motion, ObjectId, PatchId, Picture, Pose, ServerTime, SlotMask,
     ToClient, ToServer, Update, VertexId, ViewReport, Welcome, WireError,
 };
 
@@ -74,7 +74,7 @@ fn bad_welcome(change: impl FnOnce(&mut Welcome)) -> &'static str {
     let mut welcome = samples::welcome();
     change(&mut welcome);
     let body = postcard::to_stdvec(&welcome).unwrap();
-    let bytes = [&b"shadecast\x03\x00\x10"[..], &body].concat();
+    let bytes = [&b"shadecast\x04\x00\x10"[..], &body].concat();
     let what = refused(ToClient::decode(&bytes));
     assert_eq!(refused(ToClient::Welcome(welcome).encode()), what);
     what
@@ -205,15 +205,47 @@ fn blocks_are_inside_the_largest_atlas() {
 }
 
 #[test]
-fn a_mask_fits_a_block_of_the_same_update() {
+fn slots_of_triangles_are_inside_the_largest_atlas_and_have_weights() {
+    let slot = |corners, weights| {
+        bad_update(|u| {
+            *u = samples::update_of_triangles();
+            u.placements[0] = samples::triangle(2, corners, weights);
+        })
+    };
+    let (small, even) = ([[4, 4], [60, 4], [4, 60]], [u16::MAX; 3]);
+    assert_eq!(slot(small, [0, 65535, 65535]), "weights of a slot");
+    assert_eq!(slot(small, [65534; 3]), "weights of a slot");
+    assert_eq!(slot([[3, 4], [60, 4], [4, 60]], even), "slot position");
+    assert_eq!(slot([[4, 4], [60, 2], [4, 60]], even), "slot position");
+    let over = [[65_533, 4], [65_500, 4], [65_500, 60]];
+    assert_eq!(slot(over, even), "slot position");
+    let long = [[4, 4], [4 + 8 * 2048, 4], [4, 60]];
+    assert_eq!(slot(long, even), "slot size");
+}
+
+#[test]
+fn all_slots_are_of_one_kind() {
+    let mixed = bad_update(|u| {
+        u.placements[1] = samples::triangle(3, [[4, 4], [60, 4], [4, 60]], [u16::MAX; 3]);
+    });
+    assert_eq!(mixed, "mixture of slots");
+}
+
+#[test]
+fn a_mask_fits_a_slot_of_the_same_update() {
     assert_eq!(bad_update(|u| u.masks[0].bits.push(0)), "length of a mask");
     assert_eq!(
         bad_update(|u| u.masks[1].bits.truncate(1)),
         "length of a mask"
     );
-    let stray = BlockMask {
+    let stray = SlotMask {
         patch: PatchId(4),
         bits: vec![0],
     };
     assert_eq!(bad_update(|u| u.masks[0] = stray), "length of a mask");
+    let of_triangle = bad_update(|u| {
+        *u = samples::update_of_triangles();
+        u.masks[0].bits.push(0);
+    });
+    assert_eq!(of_triangle, "length of a mask");
 }

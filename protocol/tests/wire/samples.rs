@@ -2,10 +2,10 @@
 
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
-    Acknowledgement, Block, BlockMask, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId,
-    Hand, Hello, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Picture, Placement,
-    Pose, Refusal, ResetReason, Secret, ServerTime, Sky, ToClient, ToServer, Update, UpdateTiming,
-    Vertex, VertexId, ViewReport, ViewSeq, Welcome,
+    Acknowledgement, Block, ClientTime, ClockReply, Codec, Epoch, EyeView, Fov, FrameId, Hand,
+    Hello, Level, Method, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Picture, Placement,
+    Pose, Refusal, ResetReason, Secret, ServerTime, Sky, Slot, SlotMask, ToClient, ToServer,
+    TriangleSlot, Update, UpdateTiming, Vertex, VertexId, ViewReport, ViewSeq, Welcome,
 };
 
 pub(crate) fn pose() -> Pose {
@@ -59,6 +59,7 @@ pub(crate) fn view() -> ViewReport {
 pub(crate) fn welcome() -> Welcome {
     Welcome {
         codec: Codec::H264,
+        method: Method::Sas,
         atlas_size: [512, 256],
         superblock: 64,
         world_from_play: pose(),
@@ -91,11 +92,19 @@ pub(crate) fn picture() -> Picture {
 pub(crate) fn placement(patch: u32, [x, y]: [u16; 2], [width, height]: [u8; 2]) -> Placement {
     Placement {
         patch: PatchId(patch),
-        block: Block {
+        slot: Slot::Block(Block {
             x,
             y,
             level: Level { width, height },
-        },
+        }),
+    }
+}
+
+/// A placement by patch, corners and weights.
+pub(crate) fn triangle(patch: u32, corners: [[u16; 2]; 3], weights: [u16; 3]) -> Placement {
+    Placement {
+        patch: PatchId(patch),
+        slot: Slot::Triangle(TriangleSlot { corners, weights }),
     }
 }
 
@@ -148,11 +157,11 @@ pub(crate) fn update() -> Update {
             placement(70_000, [8160, 8190], [5, 1]),
         ],
         masks: vec![
-            BlockMask {
+            SlotMask {
                 patch: PatchId(2),
                 bits: vec![0b1011],
             },
-            BlockMask {
+            SlotMask {
                 patch: PatchId(9),
                 bits: vec![0xff, 0x00, 0x81, 0x7e, 1, 2, 3, 4],
             },
@@ -168,6 +177,24 @@ pub(crate) fn update() -> Update {
             ),
             (ObjectId(5), Motion::still(Pose::IDENTITY)),
         ],
+    }
+}
+
+/// The same with slots of triangles.
+pub(crate) fn update_of_triangles() -> Update {
+    let even = [u16::MAX; 3];
+    Update {
+        placements: vec![
+            triangle(2, [[4, 4], [60, 4], [4, 60]], even),
+            triangle(3, [[92, 60], [36, 60], [92, 4]], [65535, 30000, 60001]),
+            triangle(9, [[100, 76], [164, 76], [130, 68]], [40000, 65535, 1]),
+            triangle(70_000, [[65_500, 4], [65_532, 4], [65_500, 12]], even),
+        ],
+        masks: vec![SlotMask {
+            patch: PatchId(9),
+            bits: vec![0xff, 0x7f, 0x03],
+        }],
+        ..update()
     }
 }
 
@@ -194,6 +221,7 @@ pub(crate) fn to_client() -> Vec<ToClient> {
         ToClient::Refused(Refusal::Busy),
         ToClient::Clock(clock()),
         ToClient::Update(update()),
+        ToClient::Update(update_of_triangles()),
         ToClient::Picture(picture()),
         ToClient::Bye,
     ]

@@ -23,7 +23,7 @@ mod policy;
 #[cfg(test)]
 mod tests;
 
-use shadecast_protocol::{Block, Epoch, PatchId, Placement};
+use shadecast_protocol::{Epoch, PatchId, Placement, Slot};
 use thiserror::Error;
 
 pub use footprints::Footprints;
@@ -49,7 +49,7 @@ pub enum AtlasError {
     },
 }
 
-/// What one frame of the atlas changed. All lists ascend by patch.
+/// What one frame of the atlas changed, whatever the method. All lists ascend by patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placed {
     /// The epoch that the placement belongs to.
@@ -61,16 +61,16 @@ pub struct Placed {
     pub out_of_memory: bool,
     /// What may be seen.
     pub visible: Vec<VisiblePatch>,
-    /// Patches that lose their block. Empty on a reset, which drops all.
+    /// Patches that lose their slot. Empty on a reset, which drops all.
     pub removals: Vec<PatchId>,
-    /// Patches that get a block; on a reset, all that have one.
+    /// Patches that get a slot; on a reset, all that have one.
     pub placements: Vec<Placement>,
-    /// Those among the placements that had a block before: old one, new one.
+    /// Those among the placements that had a slot before: old one, new one.
     /// After a reset the two may be equal.
-    pub moved: Vec<(PatchId, Block, Block)>,
+    pub moved: Vec<(PatchId, Slot, Slot)>,
     /// Subtracted from log2 of all ideal areas.
     pub bias: f32,
-    /// Visible patches without a block, the least important ones.
+    /// Visible patches without a slot.
     pub unplaced: u32,
     /// The atlas after the frame.
     pub stats: AtlasStats,
@@ -84,7 +84,7 @@ pub struct VisiblePatch {
     /// Pixels of all id pictures that it covers.
     pub pixels: u32,
     /// Where it is shaded, if there is room.
-    pub block: Option<Block>,
+    pub slot: Option<Slot>,
 }
 
 /// How full an atlas is.
@@ -92,7 +92,7 @@ pub struct VisiblePatch {
 pub struct AtlasStats {
     /// Texels of the atlas.
     pub texels: u64,
-    /// Texels in blocks of patches.
+    /// Texels in slots of patches.
     pub used_texels: u64,
     /// Texels in free blocks on the stacks.
     pub stacked_texels: u64,
@@ -104,14 +104,14 @@ pub struct AtlasStats {
     pub free_superblocks: u32,
     /// Free blocks on the stacks.
     pub stacked_blocks: u32,
-    /// Patches that have a block.
+    /// Patches that have a slot.
     pub patches: u32,
     /// Atlas resets so far.
     pub resets: u32,
 }
 
 impl AtlasStats {
-    /// Share of the texels that are in blocks of patches.
+    /// Share of the texels that are in slots of patches.
     #[must_use]
     pub fn used_fraction(&self) -> f32 {
         self.used_texels as f32 / self.texels as f32

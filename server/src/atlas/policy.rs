@@ -1,7 +1,7 @@
 //! How full the atlas may be, and when it was emptied: what outlives a frame
 //! and needs no kernel.
 
-use shadecast_protocol::{Block, Epoch, Level, PatchId, Placement};
+use shadecast_protocol::{Block, Epoch, Level, PatchId, Placement, Slot};
 use shadecast_shaders::atlas::{
     AtlasParameters, FreeTexels, Level as BlockLevel, MIN_LOG2_SIDE, NONE, OCTAVE, Outcome, bits,
     status,
@@ -190,17 +190,17 @@ impl Policy {
                 placed.visible.push(VisiblePatch {
                     patch,
                     pixels: active.pixels,
-                    block: after,
+                    slot: after,
                 });
                 placed.unplaced += u32::from(after.is_none());
             }
             match (before, after) {
                 (Some(_), None) if !reset => placed.removals.push(patch),
-                (_, Some(block)) if active.bits & bits::WANTED != 0 => {
-                    placed.placements.push(Placement { patch, block });
+                (_, Some(slot)) if active.bits & bits::WANTED != 0 => {
+                    placed.placements.push(Placement { patch, slot });
                     placed
                         .moved
-                        .extend(before.map(|before| (patch, before, block)));
+                        .extend(before.map(|before| (patch, before, slot)));
                 }
                 _ => {}
             }
@@ -242,11 +242,12 @@ impl Policy {
 }
 
 /// The block at a position, with the level in the lowest byte of `level`.
-fn block(position: u32, level: u32) -> Option<Block> {
+fn block(position: u32, level: u32) -> Option<Slot> {
     let BlockLevel { width, height } = BlockLevel::of_byte(level);
-    (position != NONE).then_some(Block {
+    let block = Block {
         x: position as u16,
         y: (position >> 16) as u16,
         level: Level { width, height },
-    })
+    };
+    (position != NONE).then_some(Slot::Block(block))
 }

@@ -2,8 +2,9 @@
 //!
 //! Light lives in object space and linear HDR, apart from the surface that it
 //! falls on and from the eye that sees it. A texel's means grow sample by sample
-//! while its block stands still; what moves to another block is resampled. Each
-//! update has a budget of paths, spent where it is needed most.
+//! while its slot stays; what moves to another slot is taken over, texel by texel
+//! where they lie alike and else resampled. Each update has a budget of paths,
+//! spent where it is needed most.
 //!
 //! Source: SAS 2018, section 3.2; the accumulation and the budget are ours.
 
@@ -13,10 +14,11 @@ mod schedule;
 mod tests;
 
 use glam::Vec3;
-use shadecast_protocol::Block;
+use shadecast_protocol::{Block, Method, Slot, TriangleSlot};
 use shadecast_shaders::light::{
-    ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CELL_BYTES, CELL_COUNT, CarryParameters,
-    JUDGEMENT_BYTES, LightParameters, Move, NO_BLOCK,
+    ATLAS_OF_TRIANGLES_SOURCE, ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CARRY_TRIANGLES_SOURCE,
+    CELL_BYTES, CELL_COUNT, CarryParameters, JUDGEMENT_BYTES, LightParameters, Move, NO_BLOCK,
+    TriangleMove, TriangleRecord, how,
 };
 use wgpu::ShaderStages;
 
@@ -28,8 +30,8 @@ use crate::{
 pub use paths::{Ends, Paths};
 pub use schedule::{Job, Lasting, Schedule};
 
-/// Most blocks that are lit or moved by one update.
-const MOST_BLOCKS: u64 = 1 << 18;
+/// Most slots that are lit or moved by one update.
+const MOST_SLOTS: u64 = 1 << 18;
 
 /// Who looks at the light.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +50,7 @@ pub struct Viewer {
 pub struct Repeats {
     /// Traversal of rays.
     pub traversal: u32,
-    /// Smoothing of blocks.
+    /// Smoothing of slots.
     pub smoothing: u32,
 }
 
@@ -57,11 +59,12 @@ pub struct Repeats {
 pub struct Light {
     atlas_width: u32,
     texels: Texels,
-    /// As they were before blocks moved; made when a block first moves.
+    /// As they were before slots moved; made when one first moves.
     texels_before: Option<Texels>,
     shown: wgpu::Buffer,
     parameters: wgpu::Buffer,
-    blocks: wgpu::Buffer,
+    kernels: SlotKernels,
+    slots: wgpu::Buffer,
     noise: wgpu::Buffer,
     noise_readback: wgpu::Buffer,
     paths: Paths,
@@ -78,6 +81,37 @@ pub struct Light {
     moves: wgpu::Buffer,
     /// See [`Repeats`].
     smoothings: u32,
+}
+
+/// What is built differently for each kind of slot.
+#[derive(Clone, Copy, Debug)]
+struct SlotKernels {
+    source: &'static str,
+    carry_source: &'static str,
+    carry: &'static str,
+    record_bytes: u64,
+    move_bytes: u64,
+}
+
+impl SlotKernels {
+    const fn of(method: Method) -> Self {
+        match method {
+            Method::Sas => Self {
+                source: ATLAS_SOURCE,
+                carry_source: CARRY_SOURCE,
+                carry: "carry_blocks",
+                record_bytes: size_of::<BlockRecord>() as u64,
+                move_bytes: size_of::<Move>() as u64,
+            },
+            Method::Tss => Self {
+                source: ATLAS_OF_TRIANGLES_SOURCE,
+                carry_source: CARRY_TRIANGLES_SOURCE,
+                carry: "carry_triangles",
+                record_bytes: size_of::<TriangleRecord>() as u64,
+                move_bytes: size_of::<TriangleMove>() as u64,
+            },
+        }
+    }
 }
 
 /// What texels remember: see `atlas.wgsl`.
@@ -103,13 +137,19 @@ impl Texels {
 }
 
 impl Light {
-    /// An atlas of `size` texels, all unlit.
+    /// An atlas of `size` texels, all unlit, with the slots of `method`.
     ///
     /// # Errors
     /// When the atlas is larger than the device binds.
-    pub fn new(gpu: &Gpu, gpu_scene: &GpuScene, size: [u16; 2]) -> Result<Self, GpuError> {
+    pub fn new(
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        size: [u16; 2],
+        method: Method,
+    ) -> Result<Self, GpuError> {
+        let kernels = SlotKernels::of(method);
         let texel_count = u64::from(size[0]) * u64::from(size[1]);
-        let most_blocks = MOST_BLOCKS.min(texel_count / 4).max(1);
+        let most_slots = MOST_SLOTS.min(texel_count / 4).max(1);
         let own_layout = layout(
             gpu,
             ShaderStages::COMPUTE,
@@ -129,15 +169,15 @@ impl Light {
         let shown = gpu.scratch("shown", texel_count * 16)?;
         let cells = gpu.scratch("cells", u64::from(CELL_COUNT) * CELL_BYTES)?;
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
-        let blocks = gpu.scratch("blocks", most_blocks * size_of::<BlockRecord>() as u64)?;
-        let noise = gpu.scratch("noise", most_blocks * 4)?;
-        let judgements = gpu.scratch("judgements of blocks", most_blocks * JUDGEMENT_BYTES)?;
+        let slots = gpu.scratch("slots", most_slots * kernels.record_bytes)?;
+        let noise = gpu.scratch("noise", most_slots * 4)?;
+        let judgements = gpu.scratch("judgements of slots", most_slots * JUDGEMENT_BYTES)?;
         let group = bind(
             gpu,
             &own_layout,
             &[
                 &parameters,
-                &blocks,
+                &slots,
                 &texels.diffuse,
                 &texels.glossy,
                 &noise,
@@ -150,7 +190,7 @@ impl Light {
         let paths = Paths::new(gpu, gpu_scene, texel_count as u32)?;
         let layouts = [&gpu_scene.layout, &paths.layout, &own_layout];
         let pipeline =
-            |entry| gpu.compute_pipeline(ATLAS_SOURCE, entry, &layouts, &gpu_scene.constants);
+            |entry| gpu.compute_pipeline(kernels.source, entry, &layouts, &gpu_scene.constants);
         let carry_layout = layout(
             gpu,
             ShaderStages::COMPUTE,
@@ -171,20 +211,21 @@ impl Light {
             change: pipeline("measure_change"),
             accumulate: pipeline("accumulate"),
             measure: pipeline("measure_noise"),
-            smooth: pipeline("smooth_blocks"),
+            smooth: pipeline("smooth_slots"),
             fade: pipeline("fade_cells"),
             paths,
-            carry: gpu.compute_pipeline(CARRY_SOURCE, "carry_blocks", &[&carry_layout], &[]),
+            carry: gpu.compute_pipeline(kernels.carry_source, kernels.carry, &[&carry_layout], &[]),
             carry_layout,
             carry_parameters: gpu.uniform("carry parameters", size_of::<CarryParameters>()),
-            moves: gpu.scratch("moves", most_blocks * size_of::<Move>() as u64)?,
+            moves: gpu.scratch("moves", most_slots * kernels.move_bytes)?,
             texels,
             texels_before: None,
             shown,
             parameters,
-            blocks,
+            kernels,
+            slots,
             smoothings: 1,
-            noise_readback: gpu.readback("noise", most_blocks * 4),
+            noise_readback: gpu.readback("noise", most_slots * 4),
             noise,
             group,
         })
@@ -210,7 +251,7 @@ impl Light {
         &self.shown
     }
 
-    /// Gives the blocks of `placed` their first content, and clears the atlas on a reset.
+    /// Gives the slots of `placed` their first content, and clears the atlas on a reset.
     ///
     /// # Errors
     /// When the device has no room for the copy that moving needs.
@@ -220,16 +261,18 @@ impl Light {
         encoder: &mut wgpu::CommandEncoder,
         placed: &Placed,
     ) -> Result<(), GpuError> {
-        let mut moves: Vec<Move> = Vec::with_capacity(placed.placements.len());
+        let most = (self.moves.size() / self.kernels.move_bytes) as usize;
+        let mut moves: Vec<u32> = Vec::new();
+        let mut carries = false;
         let mut moved = placed.moved.iter().peekable();
-        for placement in &placed.placements {
+        for placement in placed.placements.iter().take(most) {
             let old = moved
                 .next_if(|(patch, ..)| *patch == placement.patch)
                 .map(|(_, old, _)| *old);
-            moves.push(move_record(placement.block, old));
+            carries |= old.is_some();
+            record_move(placement.slot, old, &mut moves);
         }
-        moves.truncate((self.moves.size() / size_of::<Move>() as u64) as usize);
-        let carries = moves.iter().any(|m| m.origin != NO_BLOCK);
+        let move_count = placed.placements.len().min(most) as u32;
         if carries {
             let before = match self.texels_before.take() {
                 Some(before) => before,
@@ -246,13 +289,13 @@ impl Light {
             }
             encoder.clear_buffer(&self.shown, 0, None);
         }
-        if moves.is_empty() {
+        if move_count == 0 {
             return Ok(());
         }
         gpu.queue
             .write_buffer(&self.moves, 0, bytemuck::cast_slice(&moves));
         let parameters = CarryParameters {
-            move_count: moves.len() as u32,
+            move_count,
             atlas_width: self.atlas_width,
             padding: [0; 2],
         };
@@ -261,7 +304,7 @@ impl Light {
         // Without anything to carry the copies are never read: any buffer will do.
         let before = match &self.texels_before {
             Some(before) => before.buffers(),
-            None => [&self.blocks; 3],
+            None => [&self.slots; 3],
         };
         let now = self.texels.buffers();
         let group = bind(
@@ -272,24 +315,25 @@ impl Light {
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&self.carry);
         pass.set_bind_group(0, &group, &[]);
-        let (x, y) = workgroups(moves.len() as u32, 1);
+        let (x, y) = workgroups(move_count, 1);
         pass.dispatch_workgroups(x, y, 1);
         Ok(())
     }
 
-    /// Traces the paths of `jobs`, of which a block has one at most: a texel takes its
+    /// Traces the paths of `jobs`, of which a slot has one at most: a texel takes its
     /// paths one after the other.
     pub fn trace(&self, gpu: &Gpu, gpu_scene: &GpuScene, jobs: &[Job], viewer: Viewer) {
-        let mut records = Vec::with_capacity(jobs.len());
+        let mut records = Vec::new();
         let mut path_count = 0;
-        for job in jobs.iter().take(self.most_blocks()) {
-            records.push(job.record(path_count));
+        let jobs = &jobs[..jobs.len().min(self.most_slots())];
+        for job in jobs {
+            job.record(path_count, &mut records);
             path_count += job.paths();
         }
-        self.set_blocks(gpu, &records, viewer);
+        self.set_slots(gpu, &records, jobs.len(), viewer);
         let ends = Ends {
             start: &self.start,
-            before_finish: Some((&self.change, records.len() as u32)),
+            before_finish: Some((&self.change, jobs.len() as u32)),
             finish: &self.accumulate,
             group: &self.group,
             from_camera: false,
@@ -297,8 +341,8 @@ impl Light {
         self.paths.follow(gpu, gpu_scene, ends, path_count);
     }
 
-    /// Makes what is shown of the blocks of `lit`, which were traced, and of `unlit`,
-    /// and tells how noisy each of the former still is. No block is in both.
+    /// Makes what is shown of the slots of `lit`, which were traced, and of `unlit`,
+    /// and tells how noisy each of the former still is. No slot is in both.
     ///
     /// # Errors
     /// When the driver fails.
@@ -310,13 +354,16 @@ impl Light {
         unlit: &[Job],
         viewer: Viewer,
     ) -> Result<Vec<f32>, GpuError> {
-        let jobs = lit.iter().chain(unlit).take(self.most_blocks());
-        let records: Vec<BlockRecord> = jobs.map(|job| job.record(0)).collect();
-        let lit = lit.len().min(records.len());
-        if records.is_empty() {
+        let count = (lit.len() + unlit.len()).min(self.most_slots());
+        if count == 0 {
             return Ok(Vec::new());
         }
-        self.set_blocks(gpu, &records, viewer);
+        let mut records = Vec::new();
+        for job in lit.iter().chain(unlit).take(count) {
+            job.record(0, &mut records);
+        }
+        let lit = lit.len().min(count);
+        self.set_slots(gpu, &records, count, viewer);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -328,12 +375,12 @@ impl Light {
             pass.set_pipeline(&self.fade);
             pass.dispatch_workgroups(CELL_COUNT / 64, 1, 1);
             pass.set_pipeline(&self.smooth);
-            let (x, y) = workgroups(records.len() as u32, 1);
+            let (x, y) = workgroups(count as u32, 1);
             for _ in 0..self.smoothings {
                 pass.dispatch_workgroups(x, y, 1);
             }
             pass.set_pipeline(&self.measure);
-            pass.dispatch_workgroups((records.len() as u32).div_ceil(64), 1, 1);
+            pass.dispatch_workgroups((count as u32).div_ceil(64), 1, 1);
         }
         if lit == 0 {
             gpu.queue.submit([encoder.finish()]);
@@ -346,14 +393,14 @@ impl Light {
         })
     }
 
-    fn most_blocks(&self) -> usize {
-        (self.blocks.size() / size_of::<BlockRecord>() as u64) as usize
+    fn most_slots(&self) -> usize {
+        (self.slots.size() / self.kernels.record_bytes) as usize
     }
 
-    fn set_blocks(&self, gpu: &Gpu, records: &[BlockRecord], viewer: Viewer) {
+    fn set_slots(&self, gpu: &Gpu, records: &[u32], count: usize, viewer: Viewer) {
         let parameters = LightParameters {
             eye: viewer.eye.to_array(),
-            block_count: records.len() as u32,
+            slot_count: count as u32,
             atlas_width: self.atlas_width,
             seed: 0,
             pixel_angle: 1.0 / viewer.pixels_per_radian,
@@ -362,8 +409,65 @@ impl Light {
         gpu.queue
             .write_buffer(&self.parameters, 0, bytemuck::bytes_of(&parameters));
         gpu.queue
-            .write_buffer(&self.blocks, 0, bytemuck::cast_slice(records));
+            .write_buffer(&self.slots, 0, bytemuck::cast_slice(records));
     }
+}
+
+/// Whether the texels of a slot may be taken over from another one as they are.
+pub fn keeps_texels(old: Slot, new: Slot) -> bool {
+    match (old, new) {
+        (Slot::Block(old), Slot::Block(new)) => old.level == new.level,
+        (Slot::Triangle(old), Slot::Triangle(new)) => new.is_laid_like(old),
+        _ => false,
+    }
+}
+
+/// Appends the record of a move, as words.
+fn record_move(new: Slot, old: Option<Slot>, moves: &mut Vec<u32>) {
+    match (new, old) {
+        (Slot::Block(new), Some(Slot::Block(old))) => {
+            moves.extend_from_slice(bytemuck::cast_slice(&[move_record(new, Some(old))]));
+        }
+        // All slots of a stream are of one kind.
+        (Slot::Block(new), _) => {
+            moves.extend_from_slice(bytemuck::cast_slice(&[move_record(new, None)]));
+        }
+        (Slot::Triangle(new), old) => {
+            let old = match old {
+                Some(Slot::Triangle(old)) => Some(old),
+                _ => None,
+            };
+            moves.extend_from_slice(bytemuck::cast_slice(&[triangle_move(new, old)]));
+        }
+    }
+}
+
+fn triangle_move(new: TriangleSlot, old: Option<TriangleSlot>) -> TriangleMove {
+    let from = old.unwrap_or(new);
+    let (how, [offset_x, offset_y]) = match old.map(|old| new.shift_from(old)) {
+        None => (how::FROM_NOTHING, [0; 2]),
+        Some(None) => (how::RESAMPLED, [0; 2]),
+        Some(Some((1, offset))) => (how::SHIFTED, offset),
+        Some(Some((_, offset))) => (how::TURNED_ROUND, offset),
+    };
+    TriangleMove {
+        to: corner_words(new),
+        to_weights: weight_words(new),
+        origin: corner_words(from),
+        origin_weights: weight_words(from),
+        how,
+        offset_x,
+        offset_y,
+    }
+}
+
+fn corner_words(slot: TriangleSlot) -> [u32; 3] {
+    slot.corners.map(|[x, y]| u32::from(x) | u32::from(y) << 16)
+}
+
+fn weight_words(slot: TriangleSlot) -> [u32; 2] {
+    let [a, b, c] = slot.weights.map(u32::from);
+    [a | b << 16, c]
 }
 
 fn position_bits(block: Block) -> u32 {

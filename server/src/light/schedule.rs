@@ -1,13 +1,13 @@
-//! Which blocks get paths in an update.
+//! Which slots get paths in an update.
 //!
-//! The budget is a number of paths. Blocks that were never lit come first, all
+//! The budget is a number of paths. Slots that were never lit come first, all
 //! of them: if they are too many, each path lights two by two texels, then four
 //! by four, and so on, so that a first look never waits. What is left goes
 //! where a path removes most visible error: many pixels, much noise, few samples.
 
 use glam::Vec3;
-use shadecast_protocol::{Block, PatchId, PatchShape};
-use shadecast_shaders::light::BlockRecord;
+use shadecast_protocol::{PatchId, PatchShape, Slot};
+use shadecast_shaders::light::{BlockRecord, TriangleRecord};
 
 use crate::patches::Patch;
 
@@ -24,11 +24,11 @@ const LEAST_WORTH: f32 = 0.01;
 /// another one.
 const STALE: f32 = 1.0;
 
-/// A block that gets one path for each of its texels, or for each square of them.
+/// A slot that gets one path for each of its texels, or for each square of them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Job {
     patch: PatchId,
-    block: Block,
+    slot: Slot,
     shape: PatchShape,
     first_triangle: u32,
     instance: u32,
@@ -41,38 +41,59 @@ pub struct Job {
 }
 
 impl Job {
-    /// Whose block it is.
+    /// Whose slot it is.
     #[must_use]
     pub fn patch(&self) -> PatchId {
         self.patch
     }
 
-    /// Paths that it takes.
+    /// Paths that it takes: one for each square of texels in the slot's bounds. Where
+    /// none of a square is the slot's own, its path ends before it begins.
     #[must_use]
     pub fn paths(&self) -> u32 {
-        let (width, height) = self.block.level.size();
-        (width >> self.log2_stride).max(1) * (height >> self.log2_stride).max(1)
+        let (bounds, side) = (self.slot.bounds(), 1 << self.log2_stride);
+        bounds.width.div_ceil(side) * bounds.height.div_ceil(side)
     }
 
-    pub(super) fn record(&self, first_job: u32) -> BlockRecord {
-        let shape = match self.shape {
-            PatchShape::Solo => 0,
-            PatchShape::Pair => 1,
-            PatchShape::Triple => 2,
-        };
-        BlockRecord {
-            first_job,
-            position: u32::from(self.block.x) | u32::from(self.block.y) << 16,
-            layout_bits: super::level_bits(self.block)
-                | shape << 8
-                | self.log2_stride << 10
-                | u32::from(self.block.level.is_turned()) << 14
-                | self.instance << 16,
-            first_triangle: self.first_triangle,
-            sample_index: self.sample_index,
-            patch_id: self.patch.0,
-            longest_history: self.longest_history,
-            glossy_keep: self.glossy_keep,
+    /// Appends the slot's record, as words.
+    pub(super) fn record(&self, first_job: u32, records: &mut Vec<u32>) {
+        let common_bits = self.log2_stride << 10 | self.instance << 16;
+        match self.slot {
+            Slot::Block(block) => {
+                let shape = match self.shape {
+                    PatchShape::Solo => 0,
+                    PatchShape::Pair => 1,
+                    PatchShape::Triple => 2,
+                };
+                let record = BlockRecord {
+                    first_job,
+                    position: u32::from(block.x) | u32::from(block.y) << 16,
+                    layout_bits: super::level_bits(block)
+                        | shape << 8
+                        | u32::from(block.level.is_turned()) << 14
+                        | common_bits,
+                    first_triangle: self.first_triangle,
+                    sample_index: self.sample_index,
+                    patch_id: self.patch.0,
+                    longest_history: self.longest_history,
+                    glossy_keep: self.glossy_keep,
+                };
+                records.extend_from_slice(bytemuck::cast_slice(&[record]));
+            }
+            Slot::Triangle(slot) => {
+                let record = TriangleRecord {
+                    first_job,
+                    layout_bits: common_bits,
+                    first_triangle: self.first_triangle,
+                    sample_index: self.sample_index,
+                    patch_id: self.patch.0,
+                    longest_history: self.longest_history,
+                    glossy_keep: self.glossy_keep,
+                    corners: super::corner_words(slot),
+                    weights: super::weight_words(slot),
+                };
+                records.extend_from_slice(bytemuck::cast_slice(&[record]));
+            }
         }
     }
 }
@@ -142,10 +163,10 @@ impl Schedule {
         }
     }
 
-    /// A patch got a block: its content was carried over, or is gone.
-    pub fn placed(&mut self, patch: PatchId, carried: bool, resized: bool) {
+    /// A patch got a slot: its content was carried over, or is gone.
+    pub fn placed(&mut self, patch: PatchId, carried: bool, resampled: bool) {
         let lit = &mut self.lit[patch.0 as usize];
-        let most = match (carried, resized) {
+        let most = match (carried, resampled) {
             (false, _) => 0.0,
             (true, true) => 12.0,
             (true, false) => return,
@@ -154,16 +175,16 @@ impl Schedule {
         lit.glossy_worth = lit.glossy_worth.min(most);
     }
 
-    /// The job of lighting each texel of a patch's block once; `eyes[n]` is the
+    /// The job of lighting each texel of a patch's slot once; `eyes[n]` is the
     /// eye in the space of `ObjectId(n)`.
     #[must_use]
-    pub fn job(&self, patches: &[Patch], id: PatchId, block: Block, eyes: &[Vec3]) -> Job {
+    pub fn job(&self, patches: &[Patch], id: PatchId, slot: Slot, eyes: &[Vec3]) -> Job {
         let patch = &patches[id.0 as usize];
         let lasting = &self.lasting[id.0 as usize];
         let view = (eyes[usize::from(patch.object.0)] - lasting.point).normalize_or_zero();
         Job {
             patch: id,
-            block,
+            slot,
             shape: patch.shape,
             first_triangle: patch.first_triangle,
             instance: u32::from(patch.object.0),
@@ -181,15 +202,15 @@ impl Schedule {
     pub fn choose(
         &self,
         patches: &[Patch],
-        placed: impl Iterator<Item = (PatchId, Block, u32)>,
+        placed: impl Iterator<Item = (PatchId, Slot, u32)>,
         budget: u32,
         eyes: &[Vec3],
     ) -> Vec<Job> {
         let mut first_looks = Vec::new();
         let mut others: Vec<(f32, Job)> = Vec::new();
-        for (id, block, pixels) in placed {
+        for (id, slot, pixels) in placed {
             let lit = self.lit[id.0 as usize];
-            let job = self.job(patches, id, block, eyes);
+            let job = self.job(patches, id, slot, eyes);
             if lit.worth <= 0.0 {
                 first_looks.push(job);
                 continue;
@@ -200,7 +221,7 @@ impl Schedule {
             // Squared error that one more sample removes, per path.
             let worth = self.worth(id, job.glossy_keep);
             let gain = believed * lit.worth / (worth * (worth + 1.0)) * pixels.max(1) as f32
-                / block.level.area() as f32;
+                / slot.bounds().area() as f32;
             others.push((gain, job));
         }
         let cost = |stride: u32| -> u64 {
@@ -237,7 +258,7 @@ impl Schedule {
             let refined = (0..coarsest)
                 .map(|log2_stride| Job { log2_stride, ..job })
                 .find(|job| u64::from(job.paths()) <= limit);
-            // A block larger than the whole budget still gets its turn.
+            // A slot larger than the whole budget still gets its turn.
             let Some(job) = refined.or_else(|| jobs.is_empty().then_some(job)) else {
                 continue;
             };
@@ -256,17 +277,17 @@ impl Schedule {
         1.0 / ((1.0 - shine) / lit.worth.max(LEAST_WORTH) + shine / glossy)
     }
 
-    /// Blocks whose reflection of the sun has moved since they were made to be
+    /// Slots whose reflection of the sun has moved since they were made to be
     /// shown: it needs no path.
     #[must_use]
     pub fn stale(
         &self,
         patches: &[Patch],
-        placed: impl Iterator<Item = (PatchId, Block, u32)>,
+        placed: impl Iterator<Item = (PatchId, Slot, u32)>,
         eyes: &[Vec3],
     ) -> Vec<Job> {
         placed
-            .map(|(id, block, _)| self.job(patches, id, block, eyes))
+            .map(|(id, slot, _)| self.job(patches, id, slot, eyes))
             .filter(|job| {
                 let lit = &self.lit[job.patch.0 as usize];
                 let lasting = &self.lasting[job.patch.0 as usize];
@@ -299,7 +320,7 @@ impl Schedule {
         }
     }
 
-    /// Notes how noisy the blocks of `jobs` were found to be.
+    /// Notes how noisy the slots of `jobs` were found to be.
     pub fn measured(&mut self, jobs: &[Job], noise: &[f32]) {
         for (job, &noise) in jobs.iter().zip(noise) {
             self.lit[job.patch.0 as usize].noise = if noise.is_finite() { noise } else { 0.0 };
@@ -310,7 +331,7 @@ impl Schedule {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use shadecast_protocol::{Level, ObjectId};
+    use shadecast_protocol::{Block, Level, ObjectId};
 
     const MATTE: Lasting = Lasting {
         longest_history: 1e4,
@@ -332,18 +353,18 @@ mod tests {
             .collect()
     }
 
-    fn block(index: u32) -> Block {
-        Block {
+    fn block(index: u32) -> Slot {
+        Slot::Block(Block {
             x: (index * 8) as u16,
             y: 0,
             level: Level {
                 width: 3,
                 height: 3,
             },
-        }
+        })
     }
 
-    fn placed(count: u32) -> impl Iterator<Item = (PatchId, Block, u32)> {
+    fn placed(count: u32) -> impl Iterator<Item = (PatchId, Slot, u32)> {
         (0..count).map(|index| (PatchId(index), block(index), 10))
     }
 

@@ -2,10 +2,11 @@
 
 mod bent;
 mod samplers;
+mod triangles;
 
 use glam::{Affine2, Vec2, Vec3, Vec4, vec2};
-use shadecast_protocol::{Block, Epoch, Level, ObjectId, PatchId, Placement};
-use shadecast_shaders::light::{patch_point, texel_coordinates};
+use shadecast_protocol::{Block, Epoch, Level, ObjectId, PatchId, Placement, Slot};
+use shadecast_shaders::light::{PatchPoint, patch_point, texel_coordinates};
 
 use super::*;
 use crate::{
@@ -24,7 +25,7 @@ const VIEWER: Viewer = Viewer {
 };
 
 /// A square that glows in four colours, one a quarter.
-fn four_quarters() -> PatchedScene {
+fn four_quarters(method: Method) -> PatchedScene {
     let uvs = [vec2(0., 0.), vec2(1., 0.), vec2(1., 1.), vec2(0., 1.)];
     let mut scene = Scene {
         materials: vec![Material {
@@ -74,13 +75,17 @@ fn four_quarters() -> PatchedScene {
         longest_edge: 10.0,
         most_triangles: 10,
     };
-    patches::cut(scene, limits)
+    patches::cut_for(method, scene, limits)
 }
 
 /// What the square glows with at patch coordinates, and whether that is well
 /// inside a quarter.
 fn glow(scene: &PatchedScene, patch_uv: Vec2) -> (Vec3, bool) {
-    let point = patch_point(1, patch_uv);
+    glow_at(scene, patch_point(1, patch_uv))
+}
+
+/// The same by one of the square's triangles.
+fn glow_at(scene: &PatchedScene, point: PatchPoint) -> (Vec3, bool) {
     let corners = scene.scene.triangles[point.triangle as usize].corners;
     let [a, b, c] = corners.map(|corner| scene.scene.corners[corner as usize].uv[0]);
     let uv = a + (b - a) * point.weights.x + (c - a) * point.weights.y;
@@ -93,7 +98,7 @@ fn glow(scene: &PatchedScene, patch_uv: Vec2) -> (Vec3, bool) {
     (color, (uv - 0.5).abs().min_element() > 0.2)
 }
 
-fn placed(block: Block, old: Option<Block>) -> Placed {
+fn placed(slot: Slot, old: Option<Slot>) -> Placed {
     let patch = PatchId(0);
     Placed {
         epoch: Epoch(1),
@@ -101,8 +106,8 @@ fn placed(block: Block, old: Option<Block>) -> Placed {
         out_of_memory: false,
         visible: Vec::new(),
         removals: Vec::new(),
-        placements: vec![Placement { patch, block }],
-        moved: old.map(|old| (patch, old, block)).into_iter().collect(),
+        placements: vec![Placement { patch, slot }],
+        moved: old.map(|old| (patch, old, slot)).into_iter().collect(),
         bias: 0.0,
         unplaced: 0,
         stats: AtlasStats::default(),
@@ -112,11 +117,11 @@ fn placed(block: Block, old: Option<Block>) -> Placed {
 #[test]
 #[ignore = "needs a Vulkan driver"]
 fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() {
-    let scene = four_quarters();
+    let scene = four_quarters(Method::Sas);
     let gpu = Gpu::open().expect("a GPU");
     let gpu_scene = GpuScene::new(&gpu, &scene.scene, Integrator::with_bounces(1), &mut |_| ())
         .expect("a scene");
-    let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2]).expect("an atlas");
+    let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2], Method::Sas).expect("an atlas");
     let schedule = Schedule::new(vec![Lasting {
         longest_history: 64.0,
         point: Vec3::ZERO,
@@ -133,14 +138,15 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
     let blocks = [at(0, 3, 4), at(16, 4, 3), at(40, 3, 4), at(0, 2, 4)];
     let mut old = None;
     for block in blocks {
-        let placed = placed(block, old);
+        let slot = Slot::Block(block);
+        let placed = placed(slot, old);
         let mut encoder = (gpu.device).create_command_encoder(&Default::default());
         light
             .record_moves(&gpu, &mut encoder, &placed)
             .expect("room");
         gpu.queue.submit([encoder.finish()]);
         // Only the first block is traced; the others are resampled from it.
-        let job = [schedule.job(&scene.patches, PatchId(0), block, &[EYE])];
+        let job = [schedule.job(&scene.patches, PatchId(0), slot, &[EYE])];
         if old.is_none() {
             light.trace(&gpu, &gpu_scene, &job, VIEWER);
         }
@@ -167,6 +173,6 @@ fn a_patch_on_its_side_is_lit_as_itself_and_keeps_its_light_when_it_is_turned() 
             }
         }
         assert!(compared > width * height / 4);
-        old = Some(block);
+        old = Some(slot);
     }
 }

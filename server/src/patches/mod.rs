@@ -1,5 +1,6 @@
 //! Cuts a scene into patches: one to three adjacent triangles that are shaded
-//! as one rectangle of texels.
+//! as one rectangle of texels, or, for methods that place triangles by themselves,
+//! single triangles.
 //!
 //! Two triangles that make a flat rectangle fill their block without waste or
 //! distortion, so pairs are preferred; a triangle that finds no partner joins
@@ -21,7 +22,7 @@ mod tests;
 
 use std::fmt;
 
-use shadecast_protocol::{ObjectId, PatchShape};
+use shadecast_protocol::{Method, ObjectId, PatchShape};
 
 use crate::scene::{Alpha, Scene, Triangle};
 
@@ -33,6 +34,8 @@ pub struct PatchedScene {
     pub scene: Scene,
     /// The index is a [`PatchId`](shadecast_protocol::PatchId).
     pub patches: Vec<Patch>,
+    /// What the patches are cut for.
+    pub method: Method,
     /// Runs of triangles that are drawn alike; together all triangles, in order.
     pub ranges: Vec<DrawRange>,
     /// What cutting had to say.
@@ -165,17 +168,27 @@ impl fmt::Display for PatchReport {
     }
 }
 
-/// Splits what is too large and groups all triangles into patches.
+/// Splits what is too large and groups all triangles into patches of one to three.
 ///
 /// Deterministic. Takes about two seconds for a million triangles.
 #[must_use]
-pub fn cut(mut scene: Scene, limits: PatchLimits) -> PatchedScene {
+pub fn cut(scene: Scene, limits: PatchLimits) -> PatchedScene {
+    cut_for(Method::Sas, scene, limits)
+}
+
+/// The same for any method: where it places triangles by themselves, none are grouped.
+#[must_use]
+pub fn cut_for(method: Method, mut scene: Scene, limits: PatchLimits) -> PatchedScene {
     let before = scene.triangles.len();
     let split_edges = subdivide::split_long_edges(&mut scene, limits);
     let added_triangles = scene.triangles.len() - before;
 
-    let adjacency = adjacency::Adjacency::new(&scene);
-    let groups = grouping::group(&adjacency);
+    let groups = match method {
+        Method::Sas => grouping::group(&adjacency::Adjacency::new(&scene)),
+        Method::Tss => (0..scene.triangles.len() as u32)
+            .map(grouping::Group::Solo)
+            .collect(),
+    };
     let (patches, ranges) = layout::lay_out(&mut scene, groups);
 
     let count = |shape| patches.iter().filter(|patch| patch.shape == shape).count();
@@ -190,6 +203,7 @@ pub fn cut(mut scene: Scene, limits: PatchLimits) -> PatchedScene {
     PatchedScene {
         scene,
         patches,
+        method,
         ranges,
         report,
     }

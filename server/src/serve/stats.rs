@@ -18,6 +18,7 @@ const WINDOW: Duration = Duration::from_secs(2);
 
 pub(super) struct Stats {
     scene: String,
+    method: &'static str,
     adapter: String,
     triangles: usize,
     patches: [f32; 3],
@@ -47,6 +48,7 @@ impl Stats {
     ) -> Self {
         Self {
             scene: arguments.scene.scene.clone(),
+            method: arguments.method.name(),
             adapter: adapter.to_owned(),
             triangles: scene.scene.triangles.len(),
             patches: scene.report.shares(),
@@ -131,6 +133,7 @@ impl Stats {
         };
         let report = json!({
             "scene": self.scene,
+            "method": self.method,
             "triangles": self.triangles,
             "adapter": self.adapter,
             "patches": { "solo": self.patches[0], "pair": self.patches[1], "triple": self.patches[2] },

@@ -2,8 +2,8 @@
 
 use glam::Vec3;
 use shadecast_protocol::{
-    Acknowledgement, ClientTime, Epoch, EyeView, Fov, Picture, Pose, ResetReason, Sky, Update,
-    ViewSeq,
+    Acknowledgement, ClientTime, Epoch, EyeView, Fov, Method, Picture, Pose, ResetReason, Sky,
+    Update, ViewSeq,
 };
 
 use super::*;
@@ -24,6 +24,7 @@ fn session() -> Session {
         secret: SECRET,
         welcome: Welcome {
             codec: Codec::H264,
+            method: Method::Sas,
             atlas_size: [512, 1024],
             superblock: 64,
             world_from_play: Pose::IDENTITY,

@@ -1,4 +1,4 @@
-//! Host structs and twins of `atlas.wgsl`.
+//! Host structs and twins of `atlas.wgsl` and `block_slots.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
@@ -9,8 +9,8 @@ use glam::Vec2;
 pub struct LightParameters {
     /// The head, which decides what glossy texels show.
     pub eye: [f32; 3],
-    /// Blocks that are lit.
-    pub block_count: u32,
+    /// Slots that are lit.
+    pub slot_count: u32,
     /// In texels.
     pub atlas_width: u32,
     /// Of the sampler.

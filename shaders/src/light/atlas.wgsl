@@ -1,6 +1,6 @@
 // Begins paths at texels of placed patches, and accumulates what they bring.
-// One thread per job; jobs of a block are consecutive, `blocks` is ascending
-// in `first_job`. Reads the scene and `blocks`; updates what a texel remembers:
+// One thread per job; jobs of a slot are consecutive, `slots` is ascending
+// in `first_job`. Reads the scene and `slots`; updates what a texel remembers:
 // - `diffuse`: mean light by the diffuse lobe over the diffuse colour, without
 //   the sun's, and its samples. It does not depend on the eye.
 // - `glossy`: mean light by the specular lobe, without the sun's, and its
@@ -8,12 +8,13 @@
 // - `moments`: share of the sun that is seen; mean squared luminance of diffuse
 //   and of glossy samples.
 // Textures, normal maps, emission and the sun's reflection are not in there:
-// `smooth_blocks` adds them exactly, however few paths have come.
-// Twin of the mapping: atlas.rs. Source: SAS 2018, section 3.2; figure 6.
+// `smooth_slots` adds them exactly, however few paths have come.
+// What a slot is says block_slots.wgsl or triangle_slots.wgsl.
+// Source: SAS 2018, section 3.2; figure 6.
 
 struct LightParameters {
     eye: vec3<f32>,
-    block_count: u32,
+    slot_count: u32,
     atlas_width: u32,
     seed: u32,
     // Width of a pixel a metre away.
@@ -22,23 +23,8 @@ struct LightParameters {
     exposure: f32,
 }
 
-struct BlockRecord {
-    first_job: u32,
-    // x | y << 16
-    position: u32,
-    // log2 width | log2 height << 4 | shape << 8 | log2 stride << 10 | turned << 14 | instance << 16
-    layout_bits: u32,
-    first_triangle: u32,
-    sample_index: u32,
-    patch_id: u32,
-    // Samples over which means run at most.
-    longest_history: f32,
-    // What old glossy samples are still worth, seen from where the eye is now.
-    glossy_keep: f32,
-}
-
 @group(2) @binding(0) var<uniform> parameters: LightParameters;
-@group(2) @binding(1) var<storage, read> blocks: array<BlockRecord>;
+@group(2) @binding(1) var<storage, read> slots: array<SlotRecord>;
 @group(2) @binding(2) var<storage, read_write> diffuse: array<vec4<f32>>;
 @group(2) @binding(3) var<storage, read_write> glossy: array<vec4<f32>>;
 @group(2) @binding(6) var<storage, read_write> moments: array<vec4<f32>>;
@@ -55,8 +41,7 @@ const OUTSHINING: f32 = 8.0;
 // Displayed brightness that is usual everywhere.
 const FAINT: f32 = 0.05;
 
-const TURNED: u32 = 1u << 14u;
-
+// A point of a patch by one of its triangles.
 struct PatchPoint {
     // Which of the patch's triangles.
     triangle: u32,
@@ -64,58 +49,25 @@ struct PatchPoint {
     b: vec2<f32>,
 }
 
-// The point of a block's patch at `p`, from 0 to 1 along the block's sides.
-fn block_point(layout_bits: u32, p: vec2<f32>) -> PatchPoint {
-    return patch_point((layout_bits >> 8u) & 3u, select(p, p.yx, (layout_bits & TURNED) != 0u));
-}
-
-// The point of a patch at patch coordinates `p`.
-fn patch_point(shape: u32, p_in: vec2<f32>) -> PatchPoint {
-    var p = p_in;
-    if (shape == 0u) {
-        let over = max(p.x + p.y - 1.0, 0.0) * 0.5;
-        p = max(p - over, vec2<f32>(0.0));
-        return PatchPoint(0u, p);
-    }
-    if (shape == 1u) {
-        if (p.x + p.y <= 1.0) {
-            return PatchPoint(0u, p);
-        }
-        // Corners 1 2 3: weights 1 - v, u + v - 1, 1 - u.
-        return PatchPoint(1u, vec2<f32>(p.x + p.y - 1.0, 1.0 - p.x));
-    }
-    let left = 2.0 * p.x + p.y;
-    if (left <= 1.0) {
-        // Corners 0 1 4.
-        return PatchPoint(0u, vec2<f32>(2.0 * p.x, p.y));
-    }
-    let right = 2.0 * p.x - p.y;
-    if (right >= 1.0) {
-        // Corners 1 2 3.
-        return PatchPoint(2u, vec2<f32>(right - 1.0, p.y));
-    }
-    // Corners 1 3 4.
-    let b3 = p.x - 0.5 * (1.0 - p.y);
-    return PatchPoint(1u, vec2<f32>(b3, p.y - b3));
-}
-
 struct Job {
-    block: BlockRecord,
-    // Of the block.
+    slot: SlotRecord,
+    // Of the slot.
     index: u32,
-    // First of the texels that the path lights, in the block.
+    laid: Laid,
+    // First of the texels that the path lights, in the slot's bounds.
     corner: vec2<u32>,
-    size: vec2<u32>,
-    // Texels that it lights on either axis.
+    // The first of those that are the slot's own.
+    first: vec2<u32>,
+    // Texels that it lights on either axis; none where none is the slot's own.
     stride: u32,
 }
 
 fn job_at(index: u32) -> Job {
     var low = 0u;
-    var high = parameters.block_count - 1u;
+    var high = parameters.slot_count - 1u;
     while (low < high) {
         let middle = (low + high + 1u) / 2u;
-        if (blocks[middle].first_job <= index) {
+        if (slots[middle].first_job <= index) {
             low = middle;
         } else {
             high = middle - 1u;
@@ -124,29 +76,58 @@ fn job_at(index: u32) -> Job {
     return job_of(low, index);
 }
 
-fn job_of(block: u32, index: u32) -> Job {
+fn job_of(slot: u32, index: u32) -> Job {
     var job: Job;
-    job.block = blocks[block];
-    job.index = block;
-    let log_stride = (job.block.layout_bits >> 10u) & 15u;
-    job.size = vec2<u32>(1u << (job.block.layout_bits & 15u), 1u << ((job.block.layout_bits >> 4u) & 15u));
+    job.slot = slots[slot];
+    job.index = slot;
+    let log_stride = log2_stride_of(job.slot);
+    job.laid = laid(job.slot);
     job.stride = 1u << log_stride;
-    let columns = max(job.size.x >> log_stride, 1u);
-    let local = index - job.block.first_job;
+    let columns = columns_of(job.laid, log_stride);
+    let local = index - job.slot.first_job;
     job.corner = vec2<u32>(local % columns, local / columns) * job.stride;
+    job.first = job.corner;
+    if (HAS_GAPS) {
+        let owned = first_owned(job.laid, job.corner, job.stride);
+        job.first = owned.xy;
+        job.stride = select(0u, job.stride, owned.z != 0u);
+    }
     return job;
 }
 
-// A block's surface at `p`, from 0 to 1 along its sides, as the eye sees it.
+// Paths side by side.
+fn columns_of(at: Laid, log2_stride: u32) -> u32 {
+    return (at.size.x + (1u << log2_stride) - 1u) >> log2_stride;
+}
+
+// The first of a square of texels that is the slot's own, and whether there is any.
+fn first_owned(at: Laid, corner: vec2<u32>, side: u32) -> vec3<u32> {
+    for (var y = corner.y; y < min(corner.y + side, at.size.y); y++) {
+        for (var x = corner.x; x < min(corner.x + side, at.size.x); x++) {
+            if (owns(at, vec2<i32>(vec2<u32>(x, y)))) {
+                return vec3<u32>(x, y, 1u);
+            }
+        }
+    }
+    return vec3<u32>(corner, 0u);
+}
+
+// Where in the lists of what texels remember.
+fn index_of_texel(at: Laid, texel: vec2<u32>) -> u32 {
+    return (at.corner.y + texel.y) * parameters.atlas_width + at.corner.x + texel.x;
+}
+
+// A slot's surface as the eye sees it.
 struct Seen {
     surface: Surface,
     wo: vec3<f32>,
 }
 
-fn seen_surface(block: BlockRecord, p: vec2<f32>, size: vec2<u32>, stride: u32) -> Seen {
-    let instance = block.layout_bits >> 16u;
-    let point = block_point(block.layout_bits, p);
-    let triangle = block.first_triangle + point.triangle;
+// At slot coordinates `p`, looked at as widely as `stride` texels.
+fn seen_surface(slot: SlotRecord, at: Laid, p: vec2<f32>, stride: u32) -> Seen {
+    let instance = slot.layout_bits >> 16u;
+    let point = surface_point(slot, at, p);
+    let triangle = slot.first_triangle + point.triangle;
     let p0 = vertex_position(triangle, 0u);
     let e1 = vertex_position(triangle, 1u) - p0;
     let e2 = vertex_position(triangle, 2u) - p0;
@@ -164,8 +145,7 @@ fn seen_surface(block: BlockRecord, p: vec2<f32>, size: vec2<u32>, stride: u32) 
     if (materials[triangles[triangle].w & MATERIAL_MASK].double_sided == 0u && dot(wo, n) < 0.001) {
         wo = normalize(wo + n * (0.001 - dot(wo, n)));
     }
-    let texels_of_triangle = max(f32(size.x - 1u) * f32(size.y - 1u), 1.0) * 0.5;
-    let width = sqrt(0.5 * length(doubled) / texels_of_triangle) * f32(stride);
+    let width = sqrt(0.5 * length(doubled) / texels_of_triangle(at)) * f32(stride);
     return Seen(surface_at(triangle, point.b, wo, width), wo);
 }
 
@@ -176,21 +156,22 @@ fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         return;
     }
     let job = job_at(wave.first_job + path);
-    let seed = hash(hash(job.block.patch_id * 0x9e3779b9u + parameters.seed) ^ (job.corner.x << 16u | job.corner.y));
-    var rng = Sampler(job.block.sample_index, seed, 0u);
-    let extent = vec2<f32>(job.size - 1u);
+    if (HAS_GAPS && job.stride == 0u) {
+        for (var ray = 0u; ray < 3u; ray++) {
+            send_nothing(path, ray);
+        }
+        return;
+    }
+    let seed = hash(hash(job.slot.patch_id * 0x9e3779b9u + parameters.seed) ^ (job.corner.x << 16u | job.corner.y));
+    var rng = Sampler(job.slot.sample_index, seed, 0u);
+    // Jitter inside the texel.
     let middle = vec2<f32>(job.corner) + 0.5 * f32(job.stride - 1u);
-    // Jitter inside the texel; what would leave the patch is reflected back in.
-    var p = (middle + (sample_2d(&rng) - 0.5) * f32(job.stride)) / extent;
-    p = 1.0 - abs(1.0 - abs(p));
-    // Kept off the very edge, where two walls of a corner meet.
-    p = mix(vec2<f32>(0.02) / extent, 1.0 - vec2<f32>(0.02) / extent, clamp(p, vec2<f32>(0.0), vec2<f32>(1.0)));
-
-    let seen = seen_surface(job.block, p, job.size, job.stride);
+    let p = start_coordinates(job.laid, middle + (sample_2d(&rng) - 0.5) * f32(job.stride));
+    let seen = seen_surface(job.slot, job.laid, p, job.stride);
     var state: PathState;
     state.throughput = vec3<f32>(1.0);
     state.seed = seed;
-    state.sample_index = job.block.sample_index;
+    state.sample_index = job.slot.sample_index;
     state.progress = 1u | LOBES_APART;
     state.cell = cell_around(seen.surface.position, seen.surface.ng, sample_2d(&rng) - 0.5);
     leave_vertex(path, seen.surface, seen.wo, 0u, 0u, state);
@@ -213,10 +194,10 @@ fn found_by(state: PathState) -> Found {
 }
 
 // Samples that a texel's diffuse and glossy means run over when a path is added.
-fn histories_at(at: u32, block: BlockRecord, path: PathState, judgement: Judgement) -> vec2<f32> {
+fn histories_at(at: u32, slot: SlotRecord, path: PathState, judgement: Judgement) -> vec2<f32> {
     let moves = (path.progress & NEAR_MOVER) != 0u;
-    let longest = select(block.longest_history, min(block.longest_history, MOVING_HISTORY), moves);
-    return min(vec2<f32>(diffuse[at].w, glossy[at].w * block.glossy_keep), vec2<f32>(longest)) * judgement.kept;
+    let longest = select(slot.longest_history, min(slot.longest_history, MOVING_HISTORY), moves);
+    return min(vec2<f32>(diffuse[at].w, glossy[at].w * slot.glossy_keep), vec2<f32>(longest)) * judgement.kept;
 }
 
 // Of a path's light, what a mean of `samples` takes: no more than `OUTSHINING` times
@@ -230,7 +211,7 @@ fn limited(light: vec3<f32>, usual: f32, samples: f32) -> vec3<f32> {
     return light * select(1.0, min(most / max(luminance(light), 1e-30), 1.0), SMOOTHING);
 }
 
-// What a texel takes of what a path found. The block's texels share the excess: it is
+// What a texel takes of what a path found. The slot's texels share the excess: it is
 // spread out, not lost.
 fn accepted_at(at: u32, found: Found, histories: vec2<f32>, judgement: Judgement) -> Found {
     let usual = max(judgement.usual, vec2<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb)));
@@ -244,6 +225,9 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
         return;
     }
     let job = job_at(wave.first_job + path);
+    if (HAS_GAPS && job.stride == 0u) {
+        return;
+    }
     let state = paths[path];
     // A coarse look is one sample, shared by the texels that it lights.
     let weight_of_sample = 1.0 / f32(job.stride * job.stride);
@@ -251,11 +235,14 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     let judgement = judgements[job.index];
     let shared_out = Found(judgement.diffuse_excess, judgement.glossy_excess, 0.0);
     add_to_cell(state.cell, limited(found.diffuse, judgement.usual.x, judgement.around));
-    for (var y = 0u; y < min(job.stride, job.size.y - job.corner.y); y++) {
-        for (var x = 0u; x < min(job.stride, job.size.x - job.corner.x); x++) {
-            let at = ((job.block.position >> 16u) + job.corner.y + y) * parameters.atlas_width
-                + (job.block.position & 0xffffu) + job.corner.x + x;
-            let histories = histories_at(at, job.block, state, judgement);
+    for (var y = 0u; y < min(job.stride, job.laid.size.y - job.corner.y); y++) {
+        for (var x = 0u; x < min(job.stride, job.laid.size.x - job.corner.x); x++) {
+            let texel = job.corner + vec2<u32>(x, y);
+            if (HAS_GAPS && !owns(job.laid, vec2<i32>(texel))) {
+                continue;
+            }
+            let at = index_of_texel(job.laid, texel);
+            let histories = histories_at(at, job.slot, state, judgement);
             let own = accepted_at(at, found, histories, judgement);
             let others = accepted_at(at, shared_out, histories, judgement);
             let light = own.diffuse + others.diffuse;

@@ -1,4 +1,4 @@
-//! Host structs of `carry.wgsl`.
+//! Host structs of `carry.wgsl` and `carry_triangles.wgsl`.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -18,6 +18,38 @@ pub struct Move {
     pub origin: u32,
     /// Zero.
     pub padding: u32,
+}
+
+/// A triangle's slot that gets its first content.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+pub struct TriangleMove {
+    /// The new slot's corners, as in [`TriangleRecord`](super::TriangleRecord).
+    pub to: [u32; 3],
+    /// Its weights.
+    pub to_weights: [u32; 2],
+    /// The old slot's corners.
+    pub origin: [u32; 3],
+    /// Its weights.
+    pub origin_weights: [u32; 2],
+    /// See [`how`].
+    pub how: u32,
+    /// Where texels lie alike: the old one is the new one, or its opposite, and this.
+    pub offset_x: i32,
+    /// The same down.
+    pub offset_y: i32,
+}
+
+/// How a triangle's light comes into its slot: [`TriangleMove::how`].
+pub mod how {
+    /// There was no slot before.
+    pub const FROM_NOTHING: u32 = 0;
+    /// Between the texels of the old slot.
+    pub const RESAMPLED: u32 = 1;
+    /// Texel by texel.
+    pub const SHIFTED: u32 = 2;
+    /// Texel by texel, after a half turn.
+    pub const TURNED_ROUND: u32 = 3;
 }
 
 /// What is the same for all moves.

@@ -1,20 +1,20 @@
-// How much of what a block remembers still holds: all of it, unless its new paths
+// How much of what a slot remembers still holds: all of it, unless its new paths
 // together found other light by more than noise explains. One texel cannot tell; a
-// block can, and so a light that moves, dims or is hidden is followed at once while
+// slot can, and so a light that moves, dims or is hidden is followed at once while
 // what stands still keeps its history.
-// One workgroup per block; reads what its paths of this wave found and what its
+// One workgroup per slot; reads what its paths of this wave found and what its
 // texels remember, writes `judgements`. Runs before `accumulate`.
 // Related: Schied et al., "Gradient Estimation for Real-Time Adaptive Temporal
 // Filtering", 2018, which traces paths again to the same end.
 
 struct Judgement {
-    // How much of the block's diffuse and of its glossy history holds.
+    // How much of the slot's diffuse and of its glossy history holds.
     kept: vec2<f32>,
     // Luminance that a diffuse and a glossy path usually bring here.
     usual: vec2<f32>,
     // What one path is short of by `limited`, on average over the wave's paths.
     diffuse_excess: vec3<f32>,
-    // Paths that the cells about the block have heard of, on average.
+    // Paths that the cells about the slot have heard of, on average.
     around: f32,
     glossy_excess: vec3<f32>,
     padding: u32,
@@ -61,23 +61,25 @@ var<workgroup> judged: Judgement;
 fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32) {
     let index = group.x + group.y * groups.x;
-    if (index >= parameters.block_count) {
+    if (index >= parameters.slot_count) {
         return;
     }
-    let block = blocks[index];
+    let slot = slots[index];
     var end = wave.first_job + wave.path_count;
-    if (index + 1u < parameters.block_count) {
-        end = min(end, blocks[index + 1u].first_job);
+    if (index + 1u < parameters.slot_count) {
+        end = min(end, slots[index + 1u].first_job);
     }
-    let first = max(block.first_job, wave.first_job) + lane;
+    let first = max(slot.first_job, wave.first_job) + lane;
     var change: Change;
     for (var i = first; i < end; i += 64u) {
         let job = job_of(index, i);
-        let at = ((block.position >> 16u) + job.corner.y) * parameters.atlas_width
-            + (block.position & 0xffffu) + job.corner.x;
+        if (HAS_GAPS && job.stride == 0u) {
+            continue;
+        }
+        let at = index_of_texel(job.laid, job.first);
         let path = paths[i - wave.first_job];
         let found = found_by(path);
-        let samples = vec3<f32>(diffuse[at].w, glossy[at].w * block.glossy_keep, diffuse[at].w);
+        let samples = vec3<f32>(diffuse[at].w, glossy[at].w * slot.glossy_keep, diffuse[at].w);
         let remembered = vec3<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb), moments[at].x);
         let squares = vec3<f32>(moments[at].yz, moments[at].x);
         let spread = max(squares - remembered * remembered, vec3<f32>(0.0));
@@ -114,11 +116,13 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     var excess: Excess;
     for (var i = first; SMOOTHING && i < end; i += 64u) {
         let job = job_of(index, i);
-        let at = ((block.position >> 16u) + job.corner.y) * parameters.atlas_width
-            + (block.position & 0xffffu) + job.corner.x;
+        if (HAS_GAPS && job.stride == 0u) {
+            continue;
+        }
+        let at = index_of_texel(job.laid, job.first);
         let path = paths[i - wave.first_job];
         let found = found_by(path);
-        let accepted = accepted_at(at, found, histories_at(at, block, path, judgement), judgement);
+        let accepted = accepted_at(at, found, histories_at(at, slot, path, judgement), judgement);
         excess.diffuse += found.diffuse - accepted.diffuse;
         excess.glossy += found.glossy - accepted.glossy;
     }

@@ -1,26 +1,29 @@
-// How noisy each block just lit still is, as it is seen.
-// One thread per block; reads what its texels remember and what is shown of them,
-// writes `noise`: the mean over the block of the standard error relative to the
+// How noisy each slot just lit still is, as it is seen.
+// One thread per slot; reads what its texels remember and what is shown of them,
+// writes `noise`: the mean over the slot of the standard error relative to the
 // tone curve's scale.
 
 @group(2) @binding(4) var<storage, read_write> noise: array<f32>;
 
-// Texels looked at per block and axis.
+// Texels looked at per slot and axis.
 const NOISE_SIDE: u32 = 8u;
 
 @compute @workgroup_size(64)
 fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
-    if (id.x >= parameters.block_count) {
+    if (id.x >= parameters.slot_count) {
         return;
     }
-    let block = blocks[id.x];
-    let size = vec2<u32>(1u << (block.layout_bits & 15u), 1u << ((block.layout_bits >> 4u) & 15u));
+    let here = laid(slots[id.x]);
+    let size = here.size;
     let step = max(size / NOISE_SIDE, vec2<u32>(1u));
     var sum = 0.0;
     var count = 0.0;
     for (var y = 0u; y < size.y; y += step.y) {
         for (var x = 0u; x < size.x; x += step.x) {
-            let at = ((block.position >> 16u) + y) * parameters.atlas_width + (block.position & 0xffffu) + x;
+            if (HAS_GAPS && !owns(here, vec2<i32>(vec2<u32>(x, y)))) {
+                continue;
+            }
+            let at = index_of_texel(here, vec2<u32>(x, y));
             let mean = vec2<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb));
             let samples = max(vec2<f32>(diffuse[at].w, glossy[at].w), vec2<f32>(1.0));
             let error = sqrt(max(moments[at].yz - mean * mean, vec2<f32>(0.0)) / samples);
@@ -31,5 +34,5 @@ fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
             count += 1.0;
         }
     }
-    noise[id.x] = sum / count;
+    noise[id.x] = sum / max(count, 1.0);
 }

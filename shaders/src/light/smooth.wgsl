@@ -1,13 +1,13 @@
-// Makes what is shown of blocks that were lit or moved: smooths what few samples
+// Makes what is shown of slots that were lit or moved: smooths what few samples
 // have lit, and puts it on the surface.
 //
-// Diffuse and glossy light are each the mean over a small window of the block,
+// Diffuse and glossy light are each the mean over a small window of the slot,
 // each neighbour counting by its samples and by how likely the difference is
 // noise; diffuse light besides over the surroundings in the world, which reach
 // across the borders of patches. All fades out as the texel's own error falls, so
 // that a still scene converges to what was traced. Colour, normal, emission and the
 // sun's reflection are those of the texel's middle: they are free of noise.
-// One workgroup per block; reads the scene and what texels remember, writes `shown`.
+// One workgroup per slot; reads the scene and what texels remember, writes `shown`.
 // Source: Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017,
 // sections 4.1 and 4.4, with one small window instead of a pyramid.
 
@@ -53,14 +53,14 @@ fn likeness(difference: f32, variance: f32) -> f32 {
     return exp(-difference * difference / (TOLERANCE * TOLERANCE * max(variance, 1e-8)));
 }
 
-// The interpolated vertex normal of a block's surface at `p`, from 0 to 1 along the
-// block's sides, on the side of `wo`.
-fn vertex_normal_at(block: BlockRecord, p: vec2<f32>, ng: vec3<f32>) -> vec3<f32> {
-    let point = block_point(block.layout_bits, p);
-    let record = triangles[block.first_triangle + point.triangle];
+// The interpolated vertex normal of a slot's surface at `p`, in texels from the middle
+// of the first one, on the side of `wo`.
+fn vertex_normal_at(slot: SlotRecord, at: Laid, p: vec2<f32>, ng: vec3<f32>) -> vec3<f32> {
+    let point = surface_point(slot, at, coordinates(at, p));
+    let record = triangles[slot.first_triangle + point.triangle];
     var n = corners[record.x * 3u].xyz * (1.0 - point.b.x - point.b.y) + corners[record.y * 3u].xyz * point.b.x
         + corners[record.z * 3u].xyz * point.b.y;
-    let instance = block.layout_bits >> 16u;
+    let instance = slot.layout_bits >> 16u;
     if (HAS_MOVERS && instance != 0u) {
         n = transform_vector(instances[instance].world_from_object, n);
     }
@@ -70,16 +70,16 @@ fn vertex_normal_at(block: BlockRecord, p: vec2<f32>, ng: vec3<f32>) -> vec3<f32
 // The sun by both lobes, where all of it is seen, as the mean over the texel at `p`:
 // on a bent surface a highlight narrower than a texel would flare or be missed. A
 // lobe narrower than the sun shows the sun's disc.
-fn sunlight(block: BlockRecord, seen: Seen, p: vec2<f32>, size: vec2<f32>) -> vec3<f32> {
+fn sunlight(slot: SlotRecord, at: Laid, seen: Seen, p: vec2<f32>) -> vec3<f32> {
     var s = seen.surface;
     s.alpha = max(s.alpha, sqrt(max(2.0 - 2.0 * globals.sun_cos, 0.0)));
     // What lies beyond the patch is not the texel's.
-    let low = max(p - 0.5, vec2<f32>(0.0)) / (size - 1.0);
-    let high = min(p + 0.5, size - 1.0) / (size - 1.0);
-    let corner = vertex_normal_at(block, low, s.ng);
+    let low = inside_bounds(at, p - 0.5);
+    let high = inside_bounds(at, p + 0.5);
+    let corner = vertex_normal_at(slot, at, low, s.ng);
     let turns = vec2<f32>(
-        length(vertex_normal_at(block, vec2<f32>(high.x, low.y), s.ng) - corner),
-        length(vertex_normal_at(block, vec2<f32>(low.x, high.y), s.ng) - corner));
+        length(vertex_normal_at(slot, at, vec2<f32>(high.x, low.y), s.ng) - corner),
+        length(vertex_normal_at(slot, at, vec2<f32>(low.x, high.y), s.ng) - corner));
     let looks = vec2<i32>(clamp(ceil(turns / (LOBE_LOOK * s.alpha)), vec2<f32>(1.0), vec2<f32>(MOST_LOOKS)));
     if (all(looks == vec2<i32>(1))) {
         return both_lobes(s, evaluate_bsdf(s, seen.wo, globals.sun_direction)) * globals.sun_irradiance;
@@ -88,37 +88,45 @@ fn sunlight(block: BlockRecord, seen: Seen, p: vec2<f32>, size: vec2<f32>) -> ve
     // Geometric Specular Antialiasing", 2019, section 3.
     let covered = turns / vec2<f32>(looks);
     s.alpha = min(sqrt(s.alpha * s.alpha + dot(covered, covered) / 6.0), 1.0);
-    let middle = vertex_normal_at(block, p / (size - 1.0), s.ng);
+    let middle = vertex_normal_at(slot, at, p, s.ng);
     let mapped = select(s.ns - normalize(middle), vec3<f32>(0.0), dot(middle, seen.wo) < 0.01);
     var sum = vec3<f32>(0.0);
     for (var i = 0; i < looks.x * looks.y; i++) {
         let inside = (vec2<f32>(vec2<i32>(i % looks.x, i / looks.x)) + 0.5) / vec2<f32>(looks);
-        s.ns = facing(normalize(vertex_normal_at(block, mix(low, high, inside), s.ng)) + mapped, seen.wo);
+        s.ns = facing(normalize(vertex_normal_at(slot, at, mix(low, high, inside), s.ng)) + mapped, seen.wo);
         sum += both_lobes(s, evaluate_bsdf(s, seen.wo, globals.sun_direction));
     }
     return sum / f32(looks.x * looks.y) * globals.sun_irradiance;
 }
 
+fn inside_bounds(at: Laid, p: vec2<f32>) -> vec2<f32> {
+    return clamp(p, vec2<f32>(0.0), vec2<f32>(at.size - 1u));
+}
+
 @compute @workgroup_size(64)
-fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
+fn smooth_slots(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32) {
     let index = group.x + group.y * groups.x;
-    if (index >= parameters.block_count) {
+    if (index >= parameters.slot_count) {
         return;
     }
-    let block = blocks[index];
-    let size = vec2<i32>(vec2<u32>(1u << (block.layout_bits & 15u), 1u << ((block.layout_bits >> 4u) & 15u)));
-    let corner = vec2<i32>(vec2<u32>(block.position & 0xffffu, block.position >> 16u));
+    let slot = slots[index];
+    let laid_here = laid(slot);
+    let size = vec2<i32>(laid_here.size);
+    let corner = vec2<i32>(laid_here.corner);
     let width = i32(parameters.atlas_width);
     for (var i = i32(lane); i < size.x * size.y; i += 64) {
         let p = vec2<i32>(i % size.x, i / size.x);
+        if (HAS_GAPS && !owns(laid_here, p)) {
+            continue;
+        }
         let at = u32((corner.y + p.y) * width + corner.x + p.x);
         let here = diffuse[at];
         if (here.w <= 0.0) {
             shown[at] = vec4<f32>(0.0);
             continue;
         }
-        let seen = seen_surface(block, vec2<f32>(p) / vec2<f32>(size - 1), vec2<u32>(size), 1u);
+        let seen = seen_surface(slot, laid_here, coordinates(laid_here, vec2<f32>(p)), 1u);
         let s = seen.surface;
         let shiny = glossy[at];
         var diffuse_light = here.rgb;
@@ -134,6 +142,9 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
             let high = min(p + RADIUS, size - 1);
             for (var y = low.y; y <= high.y; y++) {
                 for (var x = low.x; x <= high.x; x++) {
+                    if (HAS_GAPS && !owns(laid_here, vec2<i32>(x, y))) {
+                        continue;
+                    }
                     let near = u32((corner.y + y) * width + corner.x + x);
                     let other = diffuse[near];
                     let other_glossy = glossy[near];
@@ -159,7 +170,7 @@ fn smooth_blocks(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroup
         }
         var light = s.emissive + diffuse_color(s) * diffuse_light + glossy_light;
         if (HAS_SUN) {
-            light += moments[at].x * sunlight(block, seen, vec2<f32>(p), vec2<f32>(size));
+            light += moments[at].x * sunlight(slot, laid_here, seen, vec2<f32>(p));
         }
         shown[at] = vec4<f32>(sound(light), here.w);
     }

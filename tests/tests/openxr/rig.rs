@@ -12,7 +12,7 @@ use shadecast_client::{
     ClientFrame, ClientTiming, DecodedPicture, DrawVertex, HeadView, Input, YuvPicture,
 };
 use shadecast_protocol::{
-    ClientTime, Epoch, Fov, FrameId, Motion, Pose, Sky, UpdateTiming, Welcome,
+    ClientTime, Epoch, Fov, FrameId, Method, Motion, Pose, Sky, UpdateTiming, Welcome,
 };
 use shadecast_simulated_runtime::sys::{Fovf, Posef};
 use shadecast_simulated_runtime::{Controller, Eyes, Image, Runtime, Script, ViewPart};
@@ -120,6 +120,7 @@ impl Rig {
 pub(crate) fn welcome() -> Welcome {
     Welcome {
         codec: shadecast_protocol::Codec::H264,
+        method: Method::Sas,
         atlas_size: [64; 2],
         superblock: 16,
         world_from_play: Pose::IDENTITY,
@@ -143,7 +144,7 @@ pub(crate) fn red_square(half: f32) -> Arc<ClientFrame> {
     let vertices = corners.map(|(x, y)| DrawVertex {
         position: [x, y, -2.0],
         object: 0,
-        texel: [8.0, 8.0],
+        texel: [8.0, 8.0, 1.0],
     });
     Arc::new(ClientFrame {
         frame: FrameId(1),
@@ -155,6 +156,7 @@ pub(crate) fn red_square(half: f32) -> Arc<ClientFrame> {
         vertices: Arc::new(vertices.to_vec()),
         indices: Arc::new(vec![0, 1, 2, 0, 2, 3]),
         opaque_indices: 6,
+        foreshortened: false,
         objects_lead: 0,
         motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),
         // Red in limited-range BT.709.

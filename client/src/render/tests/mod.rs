@@ -162,7 +162,7 @@ impl Geometry {
             self.vertices.push(DrawVertex {
                 position: (centre + offset).to_array(),
                 object,
-                texel: texel.to_array(),
+                texel: texel.extend(1.0).to_array(),
             });
         }
         // Counter-clockwise seen from +Z: up and down run against rows.
@@ -186,6 +186,7 @@ impl Geometry {
             timing: ClientTiming::default(),
             vertices: Arc::new(self.vertices),
             opaque_indices: self.indices.len() as u32,
+            foreshortened: false,
             indices: Arc::new(self.indices),
             objects_lead: 0,
             motions: Arc::new(vec![Motion::still(Pose::IDENTITY)]),

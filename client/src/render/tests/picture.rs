@@ -118,6 +118,42 @@ fn blocks_do_not_bleed_into_each_other() {
     }
 }
 
+/// A floor that recedes: its far edge has half of the weight, and so the row of the
+/// atlas that is seen halfway up the picture is the one in the middle.
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn foreshortened_texels_are_spaced_as_the_eye_sees_them() {
+    let rows = picture(16, |_, y| if y < 4 { RED } else { BLUE });
+    for foreshortened in [false, true] {
+        // Upper corners at two metres, lower ones at one: a trapezoid that an eye at the
+        // origin sees as a square from -0.5 to 0.5 at a distance of one.
+        let mut geometry = Geometry::default();
+        for (x, y) in [(-1.0, 1.0), (1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)] {
+            let depth = if y > 0.0 { 2.0 } else { 1.0 };
+            let w = if foreshortened { depth } else { 1.0 };
+            let texel = Vec2::new(x, -y) * 7.5 + 8.0;
+            geometry.vertices.push(DrawVertex {
+                position: (Vec3::new(x * 0.5, y * 0.5, -1.0) * depth).to_array(),
+                object: 0,
+                texel: [texel.x * w, texel.y * w, w],
+            });
+        }
+        geometry.indices.extend([0, 3, 1, 1, 3, 2]);
+        let mut frame = geometry.frame(rows.clone());
+        frame.foreshortened = foreshortened;
+        let seen = Bench::with_frame(&frame).look(Pose::IDENTITY);
+        let is_red = |y: u32| seen.at(32, y)[0] > 128;
+        let border = (0..SIZE).find(|&y| seen.at(32, y) != [0; 3] && !is_red(y));
+        // Rows 16 to 47 show it. Without weights the middle of the surface is the
+        // border, which is seen a third of the way down.
+        let expected = if foreshortened { 31..33 } else { 26..28 };
+        assert!(
+            border.is_some_and(|border| expected.contains(&border)),
+            "{border:?}"
+        );
+    }
+}
+
 #[test]
 #[ignore = "needs a Vulkan driver"]
 fn a_mask_cuts_away_its_texels() {

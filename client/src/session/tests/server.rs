@@ -5,8 +5,8 @@ use std::collections::HashMap;
 
 use glam::{Quat, Vec3};
 use shadecast_protocol::{
-    Block, Epoch, FrameId, Level, Motion, ObjectId, PatchGeometry, PatchId, PatchShape, Picture,
-    Placement, Pose, ToClient, Update, UpdateTiming, Vertex, VertexId,
+    Block, Epoch, FrameId, Level, Method, Motion, ObjectId, PatchGeometry, PatchId, PatchShape,
+    Picture, Placement, Pose, Slot, ToClient, Update, UpdateTiming, Vertex, VertexId,
 };
 
 use super::{YuvPicture, presented};
@@ -33,7 +33,7 @@ impl Default for Server {
     fn default() -> Self {
         Self {
             truth: HashMap::new(),
-            world: World::new(ATLAS),
+            world: World::new(ATLAS, Method::Sas),
             next: 0,
             epoch: 0,
             starts_epoch: true,
@@ -160,11 +160,11 @@ fn placement(number: u32) -> Placement {
     let place = number % (PLACED + 1);
     Placement {
         patch: PatchId(number),
-        block: Block {
+        slot: Slot::Block(Block {
             x: 4 * place as u16,
             y: 0,
             level,
-        },
+        }),
     }
 }
 

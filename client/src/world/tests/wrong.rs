@@ -67,15 +67,22 @@ fn a_wrong_update_is_named_and_changes_nothing() {
         ),
         (
             wrong(|u| u.placements[0] = placement(6, 62, 0, [2, 1])),
-            WorldError::BlockOutside(PatchId(6)),
+            WorldError::SlotOutside(PatchId(6)),
         ),
         (
             wrong(|u| u.placements[0] = placement(6, 0, u16::MAX, [1, 1])),
-            WorldError::BlockOutside(PatchId(6)),
+            WorldError::SlotOutside(PatchId(6)),
         ),
         (
             wrong(|u| u.placements[0] = placement(6, 0, 0, [255, 1])),
-            WorldError::BlockOutside(PatchId(6)),
+            WorldError::SlotOutside(PatchId(6)),
+        ),
+        (
+            wrong(|u| u.placements[0].slot = triangle_slot()),
+            WorldError::SlotKind {
+                patch: PatchId(6),
+                method: Method::Sas,
+            },
         ),
         (
             wrong(|u| u.masks.push(mask(2, 1))),
@@ -112,7 +119,7 @@ fn a_wrong_update_is_named_and_changes_nothing() {
 
 #[test]
 fn more_vertices_than_a_session_may_know_are_refused() {
-    let mut world = World::new([64, 64]);
+    let mut world = World::new([64, 64], Method::Sas);
     world.positions.push(Vec3::ZERO);
     world.vertices = (0..MAX_VERTICES).map(|id| (VertexId(id), 0)).collect();
     let one_more = Update {
@@ -137,9 +144,33 @@ impl Moved for Vertex {
     }
 }
 
-fn mask(id: u32, bytes: usize) -> BlockMask {
-    BlockMask {
+fn mask(id: u32, bytes: usize) -> SlotMask {
+    SlotMask {
         patch: PatchId(id),
         bits: vec![0; bytes],
     }
+}
+
+fn triangle_slot() -> Slot {
+    Slot::Triangle(TriangleSlot {
+        corners: [[4, 4], [28, 4], [4, 28]],
+        weights: [65535; 3],
+    })
+}
+
+#[test]
+fn the_slot_of_one_triangle_does_not_hold_two() {
+    let mut world = World::new([64, 64], Method::Tss);
+    let update = Update {
+        vertices: (20..25).map(vertex).collect(),
+        patches: vec![patch(2, PatchShape::Pair)],
+        placements: vec![Placement {
+            patch: PatchId(2),
+            slot: triangle_slot(),
+        }],
+        ..update(1)
+    };
+    let refused = world.apply(&update);
+    assert_eq!(refused, Err(WorldError::SlotOfOneTriangle(PatchId(2))));
+    assert_eq!(world.epoch(), None);
 }

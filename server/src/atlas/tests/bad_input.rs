@@ -10,7 +10,7 @@ use super::{
     super::AtlasTwin,
     both::Both,
     seen, shape, view,
-    watched::{Noise, Watched},
+    watched::{Noise, Watched, block_of},
 };
 
 #[test]
@@ -27,7 +27,7 @@ fn nothing_visible_is_placed_nowhere() {
 fn one_superblock_is_shared() {
     let mut atlas = Watched::new(shape([4, 4], 4));
     let placed = atlas.place(&[seen(3, 20.0, 0.0)]);
-    assert_eq!(placed.placements[0].block.level.size(), (4, 4));
+    assert_eq!(block_of(placed.placements[0].slot).level.size(), (4, 4));
     let placed = atlas.place(&view(&mut Noise(1), 4, [-3.0, 3.0]));
     assert_eq!(placed.unplaced, 0);
     let placed = atlas.place(&view(&mut Noise(1), 100, [-3.0, 3.0]));
@@ -56,7 +56,7 @@ fn footprints_that_are_no_numbers_get_the_smallest_block() {
     let smallest = placed
         .placements
         .iter()
-        .filter(|p| p.block.level.area() == 4);
+        .filter(|p| p.slot.bounds().area() == 4);
     assert!(smallest.count() >= 2);
 }
 
@@ -104,12 +104,12 @@ fn four_million_patches_leave_out_the_least_important() {
     // 51 of 64 superblocks, 4096 smallest blocks in each.
     assert_eq!(placed.stats.patches, 51 * 4096);
     assert_eq!(placed.unplaced, 4_000_000 - 51 * 4096);
-    let waiting = placed.visible.iter().filter(|v| v.block.is_none());
+    let waiting = placed.visible.iter().filter(|v| v.slot.is_none());
     let waits_most = waiting.map(|visible| visible.pixels).max();
     let placed_least = placed
         .visible
         .iter()
-        .filter(|visible| visible.block.is_some())
+        .filter(|visible| visible.slot.is_some())
         .map(|visible| visible.pixels)
         .min();
     // Within one class of importance, here up to four pixels, the first come first.

@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use shadecast_shaders::atlas::Seen;
 
 use super::super::{AtlasShape, AtlasStats, AtlasTwin, Placed};
-use shadecast_protocol::{Block, Epoch, PatchId, Placement};
+use shadecast_protocol::{Block, Epoch, PatchId, Placement, Slot};
 
 /// A small seeded sequence (xorshift), so that plain tests need no crate.
 pub(super) struct Noise(pub(super) u64);
@@ -20,6 +20,14 @@ impl Noise {
 
     pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.below(1 << 16) as f32 / 65536.0
+    }
+}
+
+/// The only kind of slot here.
+pub(super) fn block_of(slot: Slot) -> Block {
+    match slot {
+        Slot::Block(block) => block,
+        Slot::Triangle(slot) => panic!("{slot:?}"),
     }
 }
 
@@ -60,18 +68,20 @@ impl Told {
         }
         assert!(placed.placements.is_sorted_by(|a, b| a.patch < b.patch));
         let mut moved = Vec::new();
-        for &Placement { patch, block } in &placed.placements {
-            self.known.insert(patch, block);
-            moved.extend(before.get(&patch).map(|&old| (patch, old, block)));
+        for &Placement { patch, slot } in &placed.placements {
+            self.known.insert(patch, block_of(slot));
+            let old = before.get(&patch).map(|old| Slot::Block(*old));
+            moved.extend(old.map(|old| (patch, old, slot)));
         }
         assert_eq!(moved, placed.moved);
         assert_eq!(placed.stats.patches as usize, self.known.len());
         assert_eq!(placed.visible.len(), visible.len());
         for (seen, found) in visible.iter().zip(&placed.visible) {
             assert_eq!((found.patch.0, found.pixels), (seen.patch, seen.pixels));
-            assert_eq!(found.block, self.known.get(&found.patch).copied());
+            let known = self.known.get(&found.patch).copied();
+            assert_eq!(found.slot, known.map(Slot::Block));
         }
-        let holes = placed.visible.iter().filter(|found| found.block.is_none());
+        let holes = placed.visible.iter().filter(|found| found.slot.is_none());
         assert_eq!(holes.count(), placed.unplaced as usize);
         self.check_texels(&placed.stats);
     }

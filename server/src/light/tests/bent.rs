@@ -2,7 +2,7 @@
 //! the surface has.
 
 use glam::{Vec2, Vec3, Vec4, vec2, vec3};
-use shadecast_protocol::{Block, Level, PatchId};
+use shadecast_protocol::{Block, Level, Method, PatchId, Slot};
 
 use super::{ATLAS, Lasting, Schedule, VIEWER, Viewer, placed};
 use crate::{
@@ -50,7 +50,7 @@ fn shown_mean(scene: &PatchedScene, width: u8, height: u8) -> f32 {
     let gpu = Gpu::open().expect("a GPU");
     let gpu_scene = GpuScene::new(&gpu, &scene.scene, Integrator::with_bounces(0), &mut |_| ())
         .expect("a scene");
-    let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2]).expect("an atlas");
+    let mut light = Light::new(&gpu, &gpu_scene, [ATLAS; 2], Method::Sas).expect("an atlas");
     let schedule = Schedule::new(vec![Lasting {
         longest_history: 64.0,
         point: Vec3::ZERO,
@@ -64,10 +64,10 @@ fn shown_mean(scene: &PatchedScene, width: u8, height: u8) -> f32 {
     };
     let mut encoder = (gpu.device).create_command_encoder(&Default::default());
     light
-        .record_moves(&gpu, &mut encoder, &placed(block, None))
+        .record_moves(&gpu, &mut encoder, &placed(Slot::Block(block), None))
         .expect("room");
     gpu.queue.submit([encoder.finish()]);
-    let job = [schedule.job(&scene.patches, PatchId(0), block, &[EYE])];
+    let job = [schedule.job(&scene.patches, PatchId(0), Slot::Block(block), &[EYE])];
     let viewer = Viewer { eye: EYE, ..VIEWER };
     light.trace(&gpu, &gpu_scene, &job, viewer);
     light

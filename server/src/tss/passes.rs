@@ -1,0 +1,316 @@
+//! The kernels of TSS, in their order, and the buffers between them.
+
+use glam::Vec3;
+use shadecast_shaders::tss::{
+    ActiveTriangle, CLASSES, CellPlace, Class, MEASURE_SOURCE, MeasureParameters, NONE, SOURCE,
+    TALLY_BYTES, TssParameters, TssState,
+};
+use wgpu::ShaderStages;
+
+use crate::{
+    atlas::KEEP_UNSEEN,
+    gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout, workgroups},
+    patches::PatchedScene,
+};
+
+/// Threads of a group, where a thread has a run of patches or a triangle.
+const GROUP: u32 = 64;
+/// More triangles than last frame that the first copy back has room for.
+const SPARE: u32 = 1024;
+/// Bytes of the state.
+const STATE: u64 = size_of::<TssState>() as u64;
+/// Bytes of a triangle in the list that is read back.
+const ACTIVE: u64 = size_of::<ActiveTriangle>() as u64;
+
+/// How the work is shared among threads. Results do not depend on it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Threads {
+    /// Consecutive patches of one thread.
+    pub(super) run: u32,
+    /// Threads of a group that sums up: a power of two up to 256.
+    pub(super) lanes: u32,
+}
+
+impl Threads {
+    /// As the atlas's: many threads keep a GPU busy, and cost a driver in software.
+    pub(super) fn best(gpu: &Gpu) -> Self {
+        if gpu.is_software {
+            Self { run: 128, lanes: 8 }
+        } else {
+            Self {
+                run: 32,
+                lanes: 256,
+            }
+        }
+    }
+}
+
+/// How many groups a kernel gets.
+#[derive(Clone, Copy, Debug)]
+enum Groups {
+    /// A thread for each run of patches.
+    Runs,
+    /// A thread for each patch.
+    Patches,
+    /// One.
+    One,
+}
+
+/// The kernels after measuring, and which of two digits they sort by.
+const FRAME: [(&str, Groups, bool); 11] = [
+    ("count_active", Groups::Runs, false),
+    ("scan_active", Groups::One, false),
+    ("gather", Groups::Runs, false),
+    ("choose_scale", Groups::One, false),
+    ("count_digits", Groups::Runs, false),
+    ("scan_digits", Groups::One, false),
+    ("scatter", Groups::Runs, false),
+    ("count_digits", Groups::Runs, true),
+    ("scan_digits", Groups::One, true),
+    ("scatter", Groups::Runs, true),
+    ("place", Groups::Patches, false),
+];
+
+/// Everything of the method that lies on the GPU.
+#[derive(Debug)]
+pub(super) struct Passes {
+    measure: wgpu::ComputePipeline,
+    measure_group: wgpu::BindGroup,
+    measuring: wgpu::Buffer,
+    eyes: wgpu::Buffer,
+    kernels: Vec<(wgpu::ComputePipeline, Groups)>,
+    group: wgpu::BindGroup,
+    #[cfg(test)]
+    shapes: wgpu::Buffer,
+    active: wgpu::Buffer,
+    tally: wgpu::Buffer,
+    state: wgpu::Buffer,
+    readback: wgpu::Buffer,
+    patches: u32,
+    run: u32,
+    /// Triangles that the next copy back has room for.
+    expected: u32,
+}
+
+impl Passes {
+    pub(super) fn new(
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        scene: &PatchedScene,
+        size: [u16; 2],
+        pixels: &wgpu::Buffer,
+        threads: Threads,
+    ) -> Result<Self, GpuError> {
+        let records: Vec<[u32; 2]> = (scene.patches.iter())
+            .map(|patch| [patch.first_triangle, u32::from(patch.object.0)])
+            .collect();
+        let patches = records.len() as u32;
+        let Threads { run, lanes } = threads;
+        let of_patches = |bytes: u64| u64::from(patches.max(1)) * bytes;
+        let runs = u64::from(patches.div_ceil(run)).max(1);
+        let parameters = gpu.uniform("TSS parameters", size_of::<TssParameters>());
+        let never = vec![NONE; patches.max(1) as usize];
+        let ages = gpu.storage("ages of triangles", bytemuck::cast_slice(&never))?;
+        let shapes = gpu.scratch("shapes of triangles", of_patches(8))?;
+        let active = gpu.scratch("active triangles", of_patches(ACTIVE))?;
+        let run_counts = gpu.scratch("active triangles of runs", runs * 8)?;
+        let tally = gpu.scratch("tally of triangles", TALLY_BYTES)?;
+        let cell_bytes = (CLASSES * CLASSES * size_of::<CellPlace>()) as u64;
+        let cells = gpu.scratch("places of kinds", cell_bytes)?;
+        let digits = gpu.scratch("digits of runs", runs * 4 * CLASSES as u64)?;
+        let order = gpu.scratch("order of triangles", of_patches(8))?;
+        let state = gpu.scratch("state of TSS", STATE)?;
+
+        let own_layout = layout(
+            gpu,
+            ShaderStages::COMPUTE,
+            &[
+                Binding::Uniform,
+                Binding::Read,
+                Binding::Read,
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+                Binding::Write,
+            ],
+        );
+        let buffers = [
+            &parameters,
+            pixels,
+            &shapes,
+            &ages,
+            &active,
+            &run_counts,
+            &tally,
+            &cells,
+            &digits,
+            &order,
+            &state,
+        ];
+        let group = bind(gpu, &own_layout, &buffers);
+        let kernels = FRAME.map(|(name, groups, second)| {
+            let constants = [
+                ("RUN", f64::from(run)),
+                ("LANES", f64::from(lanes)),
+                ("SECOND_DIGIT", f64::from(u8::from(second))),
+            ];
+            let kernel = gpu.compute_pipeline(SOURCE, name, &[&own_layout], &constants);
+            (kernel, groups)
+        });
+
+        let measure_layout = layout(
+            gpu,
+            ShaderStages::COMPUTE,
+            &[
+                Binding::Uniform,
+                Binding::Read,
+                Binding::Read,
+                Binding::Read,
+                Binding::Read,
+                Binding::Write,
+            ],
+        );
+        let measuring = gpu.uniform("measuring of triangles", size_of::<MeasureParameters>());
+        let records = gpu.storage("triangles of patches", bytemuck::cast_slice(&records))?;
+        let eyes = gpu.scratch("eyes", 16 * (scene.scene.objects.len() as u64 + 1))?;
+        let buffers = [&measuring, pixels, &ages, &records, &eyes, &shapes];
+        let measure_group = bind(gpu, &measure_layout, &buffers);
+        gpu.queue.write_buffer(
+            &parameters,
+            0,
+            bytemuck::bytes_of(&parameters_of(patches, size)),
+        );
+        Ok(Self {
+            measure: gpu.compute_pipeline(
+                MEASURE_SOURCE,
+                "measure_triangles",
+                &[&gpu_scene.layout, &measure_layout],
+                &gpu_scene.constants,
+            ),
+            measure_group,
+            measuring,
+            eyes,
+            kernels: kernels.into(),
+            group,
+            #[cfg(test)]
+            shapes,
+            active,
+            tally,
+            state,
+            readback: gpu.readback("placement", STATE),
+            patches,
+            run,
+            expected: 0,
+        })
+    }
+
+    /// Records the measuring and the placement of a frame; `eyes[n]` is the eye in the
+    /// space of `ObjectId(n)`.
+    pub(super) fn record(
+        &self,
+        gpu: &Gpu,
+        gpu_scene: &GpuScene,
+        encoder: &mut wgpu::CommandEncoder,
+        eyes: &[Vec3],
+        pixels_per_radian: f32,
+    ) {
+        let measuring = MeasureParameters {
+            patch_count: self.patches,
+            pixels_per_radian,
+            keep_unseen: KEEP_UNSEEN,
+            padding: 0,
+        };
+        gpu.queue
+            .write_buffer(&self.measuring, 0, bytemuck::bytes_of(&measuring));
+        let eyes: Vec<[f32; 4]> = (eyes.iter())
+            .map(|eye| eye.extend(0.0).to_array())
+            .take((self.eyes.size() / 16) as usize)
+            .collect();
+        gpu.queue
+            .write_buffer(&self.eyes, 0, bytemuck::cast_slice(&eyes));
+        {
+            let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+                label: Some("measure triangles"),
+                timestamp_writes: None,
+            });
+            pass.set_pipeline(&self.measure);
+            pass.set_bind_group(0, &gpu_scene.group, &[]);
+            pass.set_bind_group(1, &self.measure_group, &[]);
+            let (x, y) = workgroups(self.patches, GROUP);
+            pass.dispatch_workgroups(x, y, 1);
+        }
+        self.record_packing(encoder);
+    }
+
+    /// Records the placement of what has been measured.
+    pub(super) fn record_packing(&self, encoder: &mut wgpu::CommandEncoder) {
+        encoder.clear_buffer(&self.tally, 0, None);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("TSS"),
+            timestamp_writes: None,
+        });
+        pass.set_bind_group(0, &self.group, &[]);
+        for (kernel, groups) in &self.kernels {
+            let (x, y) = match groups {
+                Groups::Runs => workgroups(self.patches.div_ceil(self.run), GROUP),
+                Groups::Patches => workgroups(self.patches, GROUP),
+                Groups::One => (1, 1),
+            };
+            pass.set_pipeline(kernel);
+            pass.dispatch_workgroups(x, y, 1);
+        }
+    }
+
+    /// Submits the recorded work and reads what became of it. A copy as long as the last
+    /// list and a little longer mostly has all of it, and else the rest is fetched.
+    pub(super) fn submit_and_read(
+        &mut self,
+        gpu: &Gpu,
+        mut encoder: wgpu::CommandEncoder,
+    ) -> Result<(TssState, Vec<ActiveTriangle>), GpuError> {
+        let expected = self.expected.min(self.patches);
+        let list = u64::from(expected) * ACTIVE;
+        let bytes = STATE + list;
+        if self.readback.size() < bytes {
+            self.readback = gpu.readback("placement", bytes + bytes / 2);
+        }
+        encoder.copy_buffer_to_buffer(&self.state, 0, &self.readback, 0, STATE);
+        encoder.copy_buffer_to_buffer(&self.active, 0, &self.readback, STATE, list);
+        let (state, mut active) = gpu.submit_and_read(encoder, &self.readback, bytes, |bytes| {
+            let (state, list) = bytes.split_at(STATE as usize);
+            let state: TssState = bytemuck::pod_read_unaligned(state);
+            let known = state.active_count.min(expected) as usize;
+            let list: &[ActiveTriangle] = bytemuck::cast_slice(list);
+            (state, list[..known].to_vec())
+        })?;
+        let count = state.active_count.min(self.patches);
+        if count > expected {
+            let rest = u64::from(expected) * ACTIVE..u64::from(count) * ACTIVE;
+            active.extend(gpu.read::<ActiveTriangle>(&self.active, rest)?);
+        }
+        self.expected = count + count / 4 + SPARE;
+        Ok((state, active))
+    }
+
+    #[cfg(test)]
+    pub(super) fn shapes(&self) -> &wgpu::Buffer {
+        &self.shapes
+    }
+}
+
+/// What frames of an atlas of `size` texels are placed with.
+pub(super) fn parameters_of(patches: u32, size: [u16; 2]) -> TssParameters {
+    let [width, height] = size.map(u32::from);
+    TssParameters {
+        patch_count: patches,
+        width,
+        height,
+        most_class: Class::most(width.min(height)),
+        keep_unseen: KEEP_UNSEEN,
+        ..TssParameters::default()
+    }
+}
