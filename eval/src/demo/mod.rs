@@ -17,6 +17,7 @@ use std::{
 
 use anyhow::{Context, Result, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
+use shadecast_protocol::Method;
 use shadecast_server::scene::{self, Scene};
 
 use processes::{Client, Server};
@@ -36,6 +37,9 @@ pub struct Options {
     /// `courtyard`, or a glTF or GLB file.
     #[arg(long, value_name = "SCENE", default_value = COURTYARD)]
     pub scene: PathBuf,
+    /// How the server places light in the atlas: sas or tss.
+    #[arg(long, default_value_t)]
+    pub method: Method,
     /// Size of the courtyard, about.
     #[arg(long, value_name = "N", default_value_t = 15_000)]
     pub triangles: usize,

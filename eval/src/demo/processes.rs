@@ -50,6 +50,7 @@ impl Server {
             .arg("serve")
             .arg(&options.scene)
             .args(["--listen", "127.0.0.1:0", "--once"])
+            .args(["--method", options.method.name()])
             .args(["--atlas", &options.atlas.to_string()])
             .args(["--bitrate", &options.bitrate.to_string()])
             .arg("--stats")

@@ -57,8 +57,8 @@ fn head(text: &mut String, summary: &Summary) -> Result<()> {
     writeln!(text, "| stereo | {} |", machine.stereo)?;
     writeln!(
         text,
-        "| atlas | {0} x {0} texels, {1} Mbit/s for its video |",
-        settings.atlas, settings.bitrate
+        "| atlas | {0} x {0} texels by {1}, {2} Mbit/s for its video |",
+        settings.atlas, settings.method, settings.bitrate
     )?;
     writeln!(
         text,

@@ -79,6 +79,7 @@ pub(super) struct PeakMemory {
 /// What the run was asked for.
 #[derive(Clone, Debug, Serialize)]
 pub(super) struct Settings {
+    pub(super) method: &'static str,
     pub(super) seed: u32,
     pub(super) seconds: u32,
     pub(super) atlas: u32,
@@ -149,6 +150,7 @@ impl Summary {
             left_out: server.left_out.clone(),
             scene: server.scene.clone(),
             settings: Settings {
+                method: options.method.name(),
                 seed: options.seed,
                 seconds: options.seconds,
                 atlas: options.atlas,
@@ -209,6 +211,7 @@ pub(super) mod tests {
         let options = Options {
             out: PathBuf::from("demo-out"),
             scene: PathBuf::from("courtyard"),
+            method: Method::Sas,
             triangles: 15_000,
             seconds: 20,
             atlas: 512,
