@@ -9,7 +9,7 @@ use glam::Vec3;
 use shadecast_protocol::{FrameId, Motion, PatchId, Picture, Pose, Update, UpdateTiming};
 
 use crate::{
-    atlas::{AtlasError, AtlasStats, Placed},
+    atlas::{AtlasError, AtlasStats, Placed, VisiblePatch},
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
@@ -119,6 +119,7 @@ pub struct Pipeline {
     known: Known,
     exposure: f32,
     has_sun: bool,
+    visible: Vec<VisiblePatch>,
 }
 
 impl Pipeline {
@@ -159,6 +160,7 @@ impl Pipeline {
             picture,
             encoder,
             exposure,
+            visible: Vec::new(),
         })
     }
 
@@ -180,6 +182,26 @@ impl Pipeline {
     /// When the driver fails.
     pub fn rays(&self) -> Result<u64, GpuError> {
         self.light.rays(&self.gpu)
+    }
+
+    /// What may be seen, by the last frame.
+    #[must_use]
+    pub fn visible(&self) -> &[VisiblePatch] {
+        &self.visible
+    }
+
+    /// Puts objects where they are at this time of the scene's own, until the next frame.
+    pub fn move_objects(&mut self, scene_time: Duration) {
+        let poses: Vec<Pose> = (self.scene.scene.objects.iter())
+            .map(|object| object.world_from_object(scene_time))
+            .collect();
+        self.gpu_scene.set_poses(&self.gpu, &poses);
+    }
+
+    /// From now on light is even and no path is traced, to tell what the atlas by itself
+    /// does to a picture: see [`Light::make_even`]. Before the first frame only.
+    pub fn light_evenly(&mut self) {
+        self.light.make_even(&self.gpu);
     }
 
     /// How often stages of the light run from now on.
@@ -268,6 +290,7 @@ impl Pipeline {
         let planes = self.picture.read(&self.gpu, encoder)?;
         stages.picture = lap();
 
+        self.visible = placed.visible;
         let encoded = self.encoder.encode(&planes, placed.reset)?;
         stages.encode = lap();
 
@@ -294,7 +317,7 @@ impl Pipeline {
             },
             stats: FrameStats {
                 stages,
-                visible: placed.visible.len() as u32,
+                visible: self.visible.len() as u32,
                 unplaced: placed.unplaced,
                 bias: placed.bias,
                 atlas: placed.stats,
@@ -317,7 +340,8 @@ impl Pipeline {
         let patches = &self.scene.patches;
         let mut lit: BTreeMap<PatchId, Job> = BTreeMap::new();
         let mut paths = 0;
-        for _ in 0..MOST_ROUNDS {
+        let rounds = if self.light.is_even() { 0 } else { MOST_ROUNDS };
+        for _ in 0..rounds {
             let left = budget.saturating_sub(paths);
             let jobs = self.schedule.choose(patches, visible.clone(), left, eyes);
             let traced: u32 = jobs.iter().map(Job::paths).sum();

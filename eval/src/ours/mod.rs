@@ -1,6 +1,7 @@
 //! Our own method without network and video: the server's frames, and what a
 //! client would show of their atlas.
 
+pub(crate) mod even;
 mod view;
 
 use std::{
@@ -144,9 +145,7 @@ impl Ours {
 
     /// What the video of the last frame is made of; none before the first.
     pub(crate) fn planes(&self) -> Option<Planes> {
-        // A frame that panicked leaves no planes behind.
-        let planes = self.planes.lock().unwrap_or_else(PoisonError::into_inner);
-        planes.clone()
+        last_planes(&self.planes)
     }
 }
 
@@ -156,6 +155,14 @@ fn wall_clock() -> impl Fn() -> Duration {
 }
 
 type LastPlanes = Arc<Mutex<Option<Planes>>>;
+
+fn last_planes(planes: &LastPlanes) -> Option<Planes> {
+    // A frame that panicked leaves no planes behind.
+    planes
+        .lock()
+        .unwrap_or_else(PoisonError::into_inner)
+        .clone()
+}
 
 /// The light is looked at before it becomes video.
 struct NoVideo(LastPlanes);

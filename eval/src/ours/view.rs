@@ -1,5 +1,7 @@
 //! What a client shows of an atlas, before tone curve and video; see `view.wgsl`.
 
+use std::cell::OnceCell;
+
 use anyhow::Result;
 use bytemuck::{Pod, Zeroable};
 use glam::{Mat3, Vec3};
@@ -49,12 +51,36 @@ pub(super) struct AtlasView {
     parameters: wgpu::Buffer,
     layout: wgpu::BindGroupLayout,
     nothing: wgpu::BindGroup,
-    kernel: wgpu::ComputePipeline,
+    empty: wgpu::BindGroupLayout,
+    source: String,
+    /// Compiled when first looked with.
+    kernels: [OnceCell<wgpu::ComputePipeline>; 3],
+}
+
+/// What is looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Look {
+    /// What a client shows of the atlas: radiance.
+    Atlas,
+    /// What it would show in even light without an atlas: see `even.wgsl`.
+    Even,
+    /// What texel coordinates do from pixel to pixel: see `density.wgsl`.
+    Density,
+}
+
+impl Look {
+    fn kernel(self) -> &'static str {
+        match self {
+            Self::Atlas => "see_atlas",
+            Self::Even => "see_even",
+            Self::Density => "see_density",
+        }
+    }
 }
 
 impl AtlasView {
     pub(super) fn new(pipeline: &Pipeline, atlas_width: u16) -> Result<Self> {
-        let (gpu, gpu_scene) = pipeline.gpu();
+        let (gpu, _) = pipeline.gpu();
         let PatchedScene { scene, patches, .. } = pipeline.scene();
         let mut patch_of = vec![0_u32; scene.triangles.len()];
         let mut homes = Vec::with_capacity(patches.len());
@@ -80,8 +106,14 @@ impl AtlasView {
                 Binding::Write,
             ],
         );
-        let source = [ADVANCE_SOURCE, TRIANGLE_SOURCE, include_str!("view.wgsl")].concat();
-        let layouts = [&gpu_scene.layout, &nothing, &own];
+        let source = [
+            ADVANCE_SOURCE,
+            TRIANGLE_SOURCE,
+            include_str!("view.wgsl"),
+            include_str!("even.wgsl"),
+            include_str!("density.wgsl"),
+        ]
+        .concat();
         Ok(Self {
             atlas_width: u32::from(atlas_width),
             epoch: Epoch(0),
@@ -89,8 +121,10 @@ impl AtlasView {
             homes,
             patches: gpu.storage("patches", bytemuck::cast_slice(&patch_of))?,
             parameters: gpu.uniform("view", size_of::<ViewParameters>()),
-            kernel: gpu.compute_pipeline(&source, "see_atlas", &layouts, &gpu_scene.constants),
+            source,
+            kernels: Default::default(),
             nothing: bind(gpu, &nothing, &[]),
+            empty: nothing,
             layout: own,
         })
     }
@@ -141,10 +175,31 @@ impl AtlasView {
     pub(super) fn see(
         &self,
         pipeline: &Pipeline,
-        (pose, tangents): (Pose, [f32; 4]),
+        view: (Pose, [f32; 4]),
         size: [u32; 2],
     ) -> Result<Still> {
+        Ok(Still {
+            width: size[0],
+            height: size[1],
+            radiance: (self.look(pipeline, Look::Atlas, view, size)?.into_iter())
+                .map(|[r, g, b, _]| Vec3::new(r, g, b))
+                .collect(),
+        })
+    }
+
+    /// Four numbers a pixel of a pinhole camera.
+    pub(super) fn look(
+        &self,
+        pipeline: &Pipeline,
+        look: Look,
+        (pose, tangents): (Pose, [f32; 4]),
+        size: [u32; 2],
+    ) -> Result<Vec<[f32; 4]>> {
         let (gpu, gpu_scene) = pipeline.gpu();
+        let kernel = self.kernels[look as usize].get_or_init(|| {
+            let layouts = [&gpu_scene.layout, &self.empty, &self.layout];
+            gpu.compute_pipeline(&self.source, look.kernel(), &layouts, &gpu_scene.constants)
+        });
         let parameters = ViewParameters {
             world_from_eye: rows_of_affine(Mat3::from_quat(pose.orientation), pose.position),
             tangents,
@@ -172,7 +227,7 @@ impl AtlasView {
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
-            pass.set_pipeline(&self.kernel);
+            pass.set_pipeline(kernel);
             pass.set_bind_group(0, &gpu_scene.group, &[]);
             pass.set_bind_group(1, &self.nothing, &[]);
             pass.set_bind_group(2, &group, &[]);
@@ -180,13 +235,6 @@ impl AtlasView {
             pass.dispatch_workgroups(x, y, 1);
         }
         gpu.queue.submit([encoder.finish()]);
-        let [width, height] = size;
-        Ok(Still {
-            width,
-            height,
-            radiance: (gpu.read(&seen, 0..bytes)?.into_iter())
-                .map(|[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b))
-                .collect(),
-        })
+        Ok(gpu.read(&seen, 0..bytes)?)
     }
 }

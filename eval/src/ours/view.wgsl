@@ -48,20 +48,31 @@ fn patch_coordinates(shape: u32, triangle: u32, b: vec2<f32>) -> vec2<f32> {
     return b;
 }
 
-// Between four texels, the first of them at `corner`.
-fn between(corner: vec2<u32>, f: vec2<f32>, right: u32, down: u32) -> vec3<f32> {
-    let at = corner.y * view.atlas_width + corner.x;
-    return mix(mix(shown[at].rgb, shown[at + right].rgb, f.x),
-        mix(shown[at + down].rgb, shown[at + down + right].rgb, f.x), f.y);
+// Where a patch has a point of one of its triangles, in texels from the middle of the
+// atlas' first.
+fn atlas_point(home: Home, triangle: u32, b: vec2<f32>) -> vec2<f32> {
+    if ((home.layout_bits & TRIANGLE) != 0u) {
+        let slot = atlas_triangle(home.corners, home.weights);
+        return vec2<f32>(slot.corner) + texel_at(slot, in_atlas(slot, vec3<f32>(1.0 - b.x - b.y, b)));
+    }
+    let shape = (home.layout_bits >> 8u) & 3u;
+    let along_patch = patch_coordinates(shape, triangle - home.first_triangle, b);
+    let along_block = select(along_patch, along_patch.yx, (home.layout_bits & (1u << 14u)) != 0u);
+    return vec2<f32>(first_texel(home)) + along_block * vec2<f32>(texels_of(home) - 1u);
 }
 
-fn triangle_light(home: Home, b: vec2<f32>) -> vec3<f32> {
-    let slot = atlas_triangle(home.corners, home.weights);
-    let q = max(texel_at(slot, in_atlas(slot, vec3<f32>(1.0 - b.x - b.y, b))), vec2<f32>(0.0));
-    let low = min(vec2<u32>(q), slot.size - 1u);
-    let last = low == slot.size - 1u;
-    return between(slot.corner + low, min(q - vec2<f32>(low), vec2<f32>(1.0)),
-        select(1u, 0u, last.x), select(view.atlas_width, 0u, last.y));
+fn first_texel(home: Home) -> vec2<u32> {
+    if ((home.layout_bits & TRIANGLE) != 0u) {
+        return atlas_triangle(home.corners, home.weights).corner;
+    }
+    return vec2<u32>(home.position & 0xffffu, home.position >> 16u);
+}
+
+fn texels_of(home: Home) -> vec2<u32> {
+    if ((home.layout_bits & TRIANGLE) != 0u) {
+        return atlas_triangle(home.corners, home.weights).size;
+    }
+    return vec2<u32>(1u << (home.layout_bits & 15u), 1u << ((home.layout_bits >> 4u) & 15u));
 }
 
 fn texel_light(hit: Hit) -> vec3<f32> {
@@ -69,18 +80,24 @@ fn texel_light(hit: Hit) -> vec3<f32> {
     if (home.position == NONE) {
         return vec3<f32>(0.0);
     }
-    if ((home.layout_bits & TRIANGLE) != 0u) {
-        return triangle_light(home, hit.b);
-    }
-    let shape = (home.layout_bits >> 8u) & 3u;
-    let along_patch = patch_coordinates(shape, hit.triangle - home.first_triangle, hit.b);
-    let along_block = select(along_patch, along_patch.yx, (home.layout_bits & (1u << 14u)) != 0u);
-    let size = vec2<u32>(1u << (home.layout_bits & 15u), 1u << ((home.layout_bits >> 4u) & 15u));
-    let p = clamp(along_block, vec2<f32>(0.0), vec2<f32>(1.0)) * vec2<f32>(size - 1u);
-    let low = min(vec2<u32>(p), max(size, vec2<u32>(2u)) - 2u);
+    let first = first_texel(home);
+    let last = first + texels_of(home) - 1u;
+    let p = clamp(atlas_point(home, hit.triangle, hit.b), vec2<f32>(first), vec2<f32>(last));
+    let low = min(vec2<u32>(p), last);
     let f = p - vec2<f32>(low);
-    let corner = vec2<u32>(home.position & 0xffffu, home.position >> 16u) + low;
-    return between(corner, f, select(0u, 1u, size.x > 1u), select(0u, view.atlas_width, size.y > 1u));
+    let at = low.y * view.atlas_width + low.x;
+    let right = select(1u, 0u, low.x == last.x);
+    let down = select(view.atlas_width, 0u, low.y == last.y);
+    return mix(mix(shown[at].rgb, shown[at + right].rgb, f.x),
+        mix(shown[at + down].rgb, shown[at + down + right].rgb, f.x), f.y);
+}
+
+// Where a pixel's ray goes that leaves from `inside` of it, from 0 to 1 on either axis.
+fn direction_at(pixel: u32, inside: vec2<f32>) -> vec3<f32> {
+    let corner = vec2<f32>(vec2<u32>(pixel % view.size.x, pixel / view.size.x));
+    let at = (corner + inside) / vec2<f32>(view.size);
+    return normalize(transform_vector(view.world_from_eye, vec3<f32>(
+        mix(view.tangents.x, view.tangents.y, at.x), mix(view.tangents.z, view.tangents.w, at.y), -1.0)));
 }
 
 @compute @workgroup_size(64)
@@ -89,15 +106,12 @@ fn see_atlas(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgrou
     if (pixel >= view.size.x * view.size.y) {
         return;
     }
-    let corner = vec2<f32>(vec2<u32>(pixel % view.size.x, pixel / view.size.x));
     let eye = transform_point(view.world_from_eye, vec3<f32>(0.0));
     var sum = vec3<f32>(0.0);
     var near_mover = false;
     for (var i = 0u; i < RAYS * RAYS; i++) {
         let inside = (vec2<f32>(vec2<u32>(i % RAYS, i / RAYS)) + 0.5) / f32(RAYS);
-        let at = (corner + inside) / vec2<f32>(view.size);
-        let direction = normalize(transform_vector(view.world_from_eye, vec3<f32>(
-            mix(view.tangents.x, view.tangents.y, at.x), mix(view.tangents.z, view.tangents.w, at.y), -1.0)));
+        let direction = direction_at(pixel, inside);
         let hit = trace_past_holes(Ray(eye, INFINITE, direction, 0.0), false, true, &near_mover);
         if (hit.triangle == NONE) {
             sum += sky_radiance(direction);

@@ -1,12 +1,15 @@
 //! `shadecast-eval packing`: how fast and how well the atlas is managed.
 //!
-//! The same walk through the built-in scene, at several sizes, asks for patches;
-//! the allocator on the GPU, its twin and a quadtree place them, and the twin over
-//! simpler memories shows what each part of it is worth. GPU and twin must agree in
-//! every frame. Nothing is drawn: what is compared is where blocks lie.
+//! The packers beside each other, whole: `compare`. Then SAS by itself. The same walk
+//! through the built-in scene, at several sizes, asks for patches; the allocator on
+//! the GPU, its twin and a quadtree place them, and the twin over simpler memories
+//! shows what each part of it is worth. GPU and twin must agree in every frame.
 //!
-//! Source: SAS 2018, sections 5.3 and 5.4, table 2 and figure 11.
+//! Source: SAS 2018, sections 5.2 to 5.4, table 2 and figure 11.
 
+mod compare;
+mod culling;
+mod page;
 mod quadtree;
 mod speed;
 mod strategies;
@@ -19,26 +22,38 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use shadecast_protocol::Method;
 use shadecast_server::{
     Gpu,
     patches::{self, PatchLimits, PatchedScene},
-    scene,
+    scene::{self, Scene},
 };
 
 use crate::{
     progress::Progress,
     report::{Folder, Header},
+    scenes,
 };
 
 /// Triangles of the scene, and whether large ones are split as for streaming: for
 /// about 1,000, 10,000 and 100,000 patches asked for.
 const WALKS: [(usize, bool); 3] = [(7_000, false), (110_000, true), (1_300_000, true)];
-/// Of these walks, those of a quick run.
+/// Of these walks and of the sizes below, those of a quick run.
 const QUICK_WALKS: usize = 2;
+const QUICK_SIZES: usize = 2;
+
+/// Triangles of the built-in scene, where no other is named.
+const TRIANGLES: [usize; 3] = [15_000, 250_000, 1_000_000];
+/// Sides of the atlases, texels: 1, 4 and 8 MPix.
+const SIZES: [[u16; 2]; 3] = [[1024, 1024], [2048, 2048], [4096, 2048]];
 
 /// Measures how fast and how well the atlas is managed.
 #[derive(Args, Debug)]
 pub struct Options {
+    /// Scenes that packers are compared in: `courtyard`, `lamps`, `plates`, or glTF
+    /// files [default: the built-in one of 15,000, 250,000 and 1,000,000 triangles].
+    #[arg(value_name = "SCENE")]
+    pub scenes: Vec<String>,
     /// Folder for figures.
     #[arg(long, value_name = "DIR", default_value = crate::OUT)]
     pub out: PathBuf,
@@ -58,7 +73,24 @@ pub fn run(options: &Options) -> Result<String> {
         &WALKS[..]
     };
     let gpu = Gpu::open()?;
-    let progress = Progress::new(walks.len() as u64 + 1);
+    let subjects = subjects(options)?;
+    let sizes = if options.quick {
+        &SIZES[..QUICK_SIZES]
+    } else {
+        &SIZES[..]
+    };
+    let runs = subjects.len() * sizes.len() * Method::ALL.len();
+    let progress = Progress::new((runs + walks.len() + 1) as u64);
+    let mut compared = Vec::new();
+    for (name, scene) in &subjects {
+        compared.push(compare::measure(
+            name,
+            scene,
+            sizes,
+            options.quick,
+            &progress,
+        )?);
+    }
     let mut speeds = Vec::new();
     let mut kernels = Vec::new();
     for &(triangles, split) in walks {
@@ -73,23 +105,42 @@ pub fn run(options: &Options) -> Result<String> {
         strategy::measure(&walked(strategy::TRIANGLES, true), options.quick, &progress);
     progress.finish();
     let folder = |name| {
-        let scenes = walks
-            .iter()
-            .map(|(t, _)| format!("courtyard of {t} triangles"));
-        let header = Header::new(name, &gpu.adapter, scenes.collect(), 0);
+        let walks = (walks.iter()).map(|(triangles, _)| courtyard_of(*triangles));
+        let scenes = (subjects.iter()).map(|(name, _)| name.clone());
+        let header = Header::new(name, &gpu.adapter, scenes.chain(walks).collect(), 0);
         Folder::new(&options.out, header)
     };
+    let of_packers = page::write(&folder("packing")?, &compared)?;
     folder("packing-speed")?.csv(&speeds)?;
     folder("packing-kernels")?.csv(&kernels)?;
     folder("packing-strategies")?.csv(&strategies)?;
     let body = format!(
-        "{}\n{}\n{}",
+        "{of_packers}\n{}\n{}\n{}",
         speed::table_of(&speeds),
         speed::table_of_kernels(&kernels),
         strategy::table_of(&strategies),
     );
     folder("packing")?.page("How fast and how well the atlas is managed", &body)?;
     Ok(body)
+}
+
+fn courtyard_of(triangles: usize) -> String {
+    format!("courtyard of {triangles} triangles")
+}
+
+/// The scenes that packers are compared in.
+fn subjects(options: &Options) -> Result<Vec<(String, Scene)>> {
+    if options.scenes.is_empty() {
+        let sizes = if options.quick {
+            &TRIANGLES[..1]
+        } else {
+            &TRIANGLES[..]
+        };
+        let built_in = |&size: &usize| (courtyard_of(size), scene::courtyard(size));
+        return Ok(sizes.iter().map(built_in).collect());
+    }
+    let named = |name: &String| Ok((name.clone(), scenes::named(name)?));
+    options.scenes.iter().map(named).collect()
 }
 
 /// The built-in scene in patches; split for superblocks of 256 texels.

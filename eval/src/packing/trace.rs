@@ -8,7 +8,10 @@ use std::f32::consts::{FRAC_PI_2, TAU};
 
 use glam::{Quat, Vec3, vec3};
 use shadecast_protocol::{PatchShape, Pose};
-use shadecast_server::patches::{Patch, PatchedScene};
+use shadecast_server::{
+    patches::{Patch, PatchedScene},
+    scene::Scene,
+};
 use shadecast_shaders::atlas::{Seen, footprint};
 
 /// Updates a second.
@@ -30,10 +33,9 @@ const ENLARGEMENT: f32 = 1.2;
 /// Pixels of the picture per radian, as footprints count them.
 pub(super) const PIXELS_PER_RADIAN: f32 = WIDTH / OPENING;
 
-/// Where the head is in a frame.
-fn head(scene: &PatchedScene, frame: u32) -> Pose {
-    let seconds = frame as f32 / RATE;
-    let start = scene.scene.first_eye();
+/// Where the head is at a time.
+pub(super) fn head(scene: &Scene, seconds: f32) -> Pose {
+    let start = scene.first_eye();
     let along = SPEED / RADIUS * seconds;
     let offset = vec3(along.sin(), 0.0, 1.0 - along.cos()) * RADIUS;
     let look = LOOK * (seconds * LOOKS * TAU).sin();
@@ -45,7 +47,7 @@ fn head(scene: &PatchedScene, frame: u32) -> Pose {
 
 /// What the head asks for in a frame, by ascending patch.
 pub(super) fn seen(scene: &PatchedScene, frame: u32) -> Vec<Seen> {
-    let head = head(scene, frame);
+    let head = head(&scene.scene, frame as f32 / RATE);
     let time = std::time::Duration::from_secs_f32(frame as f32 / RATE);
     let from_world: Vec<Pose> = std::iter::once(Pose::IDENTITY)
         .chain(

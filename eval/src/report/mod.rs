@@ -14,6 +14,7 @@ use std::{
 
 use anyhow::{Context, Result};
 use cpu_time::ProcessTime;
+use image::RgbImage;
 use serde::Serialize;
 
 pub(crate) use plot::{Chart, Line, Scale, draw};
@@ -123,6 +124,21 @@ impl Folder {
     fn write(&self, path: &Path, text: &str) -> Result<()> {
         fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
     }
+}
+
+/// Pictures beside each other, the first `down` of them one above the other, and so on.
+pub(crate) fn strip(pictures: &[RgbImage], down: usize) -> RgbImage {
+    let (width, height) = pictures
+        .first()
+        .map_or((1, 1), |picture| picture.dimensions());
+    let across = pictures.len().div_ceil(down) as u32;
+    let mut strip = RgbImage::new(width * across, height * down as u32);
+    for (index, picture) in pictures.iter().enumerate() {
+        let (x, y) = (index / down, index % down);
+        let (x, y) = (x as i64 * i64::from(width), y as i64 * i64::from(height));
+        image::imageops::replace(&mut strip, picture, x, y);
+    }
+    strip
 }
 
 /// A Markdown table.

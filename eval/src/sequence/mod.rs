@@ -33,7 +33,7 @@ use crate::{
     progress::Progress,
     reference::{self, Reference, Subject},
     relmse,
-    report::{Folder, Header, Spent},
+    report::{Folder, Header, Spent, strip},
     scenes,
 };
 
@@ -242,7 +242,7 @@ fn measure(
         scene: name.to_owned(),
         motion,
         rows,
-        strip: page::strip(&pictures, shown.len()),
+        strip: strip(&pictures, shown.len()),
         reference_noise: references.iter().map(noise).sum::<f64>() / references.len() as f64,
     })
 }

@@ -3,7 +3,6 @@
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result};
-use image::RgbImage;
 
 use super::{METHODS, Measured, Row};
 use crate::report::{Chart, Folder, Line, Scale, table};
@@ -34,21 +33,6 @@ pub(super) fn write(folder: &Folder, measured: &[Measured]) -> Result<String> {
     }
     folder.page("Error while things move", &body)?;
     Ok(body)
-}
-
-/// Pictures beside each other, the first `down` of them one above the other, and so on.
-pub(super) fn strip(pictures: &[RgbImage], down: usize) -> RgbImage {
-    let (width, height) = pictures
-        .first()
-        .map_or((1, 1), |picture| picture.dimensions());
-    let across = pictures.len().div_ceil(down) as u32;
-    let mut strip = RgbImage::new(width * across, height * down as u32);
-    for (index, picture) in pictures.iter().enumerate() {
-        let (x, y) = (index / down, index % down);
-        let (x, y) = (x as i64 * i64::from(width), y as i64 * i64::from(height));
-        image::imageops::replace(&mut strip, picture, x, y);
-    }
-    strip
 }
 
 fn budgets(found: &Measured) -> Vec<f64> {

@@ -81,6 +81,8 @@ pub struct Light {
     moves: wgpu::Buffer,
     /// See [`Repeats`].
     smoothings: u32,
+    /// See [`make_even`](Self::make_even).
+    is_even: bool,
 }
 
 /// What is built differently for each kind of slot.
@@ -225,6 +227,7 @@ impl Light {
             kernels,
             slots,
             smoothings: 1,
+            is_even: false,
             noise_readback: gpu.readback("noise", most_slots * 4),
             noise,
             group,
@@ -245,6 +248,30 @@ impl Light {
         self.smoothings = repeats.smoothing;
     }
 
+    /// From now on every texel has the light of a white surroundings and nothing else:
+    /// surfaces show their own colour, without noise.
+    pub fn make_even(&mut self, gpu: &Gpu) {
+        // As many samples that nothing is smoothed.
+        const SAMPLES: f32 = 1e6;
+        let contents = [
+            [1.0, 1.0, 1.0, SAMPLES],
+            [0.0, 0.0, 0.0, SAMPLES],
+            [0.0, 1.0, 0.0, 0.0],
+        ];
+        for (buffer, content) in self.texels.buffers().into_iter().zip(contents) {
+            let all = vec![content; (buffer.size() / 16) as usize];
+            gpu.queue
+                .write_buffer(buffer, 0, bytemuck::cast_slice(&all));
+        }
+        self.is_even = true;
+    }
+
+    /// Whether it was made even.
+    #[must_use]
+    pub fn is_even(&self) -> bool {
+        self.is_even
+    }
+
     /// The radiance to show and the samples behind it, four floats a texel, row by row.
     #[must_use]
     pub fn shown(&self) -> &wgpu::Buffer {
@@ -261,6 +288,13 @@ impl Light {
         encoder: &mut wgpu::CommandEncoder,
         placed: &Placed,
     ) -> Result<(), GpuError> {
+        if self.is_even {
+            // It is everywhere already.
+            if placed.reset {
+                encoder.clear_buffer(&self.shown, 0, None);
+            }
+            return Ok(());
+        }
         let most = (self.moves.size() / self.kernels.move_bytes) as usize;
         let mut moves: Vec<u32> = Vec::new();
         let mut carries = false;
