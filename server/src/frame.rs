@@ -13,7 +13,7 @@ use crate::{
     encode::{EncodeError, VideoEncoder},
     gpu::{Gpu, GpuError, GpuScene},
     known::Known,
-    light::{Job, Lasting, Light, Repeats, Schedule, Viewer, keeps_texels},
+    light::{Job, Lasting, Light, Repeats, Schedule, Viewer, keeps_shown, keeps_texels},
     packer::Packer,
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
@@ -334,7 +334,12 @@ impl Pipeline {
             }
         }
         let mut unlit: BTreeMap<PatchId, Job> = BTreeMap::new();
+        let mut moved = placed.moved.iter().peekable();
         for placed in &placed.placements {
+            let old = moved.next_if(|(patch, ..)| *patch == placed.patch);
+            if old.is_some_and(|(_, old, new)| keeps_shown(*old, *new)) {
+                continue;
+            }
             let job = (self.schedule).job(patches, placed.patch, placed.slot, eyes);
             unlit.insert(placed.patch, job);
         }

@@ -179,6 +179,8 @@ impl Summary {
 pub(super) mod tests {
     use std::path::PathBuf;
 
+    use shadecast_protocol::Method;
+
     use super::*;
     use crate::demo::{
         recorded::tests::{client, server},

@@ -61,6 +61,8 @@ pub struct Light {
     texels: Texels,
     /// As they were before slots moved; made when one first moves.
     texels_before: Option<Texels>,
+    /// What was shown before, where it comes along.
+    shown_before: Option<wgpu::Buffer>,
     shown: wgpu::Buffer,
     parameters: wgpu::Buffer,
     kernels: SlotKernels,
@@ -91,6 +93,8 @@ struct SlotKernels {
     carry: &'static str,
     record_bytes: u64,
     move_bytes: u64,
+    /// Whether moves take along what is shown: see [`keeps_shown`].
+    carries_shown: bool,
 }
 
 impl SlotKernels {
@@ -102,6 +106,7 @@ impl SlotKernels {
                 carry: "carry_blocks",
                 record_bytes: size_of::<BlockRecord>() as u64,
                 move_bytes: size_of::<Move>() as u64,
+                carries_shown: false,
             },
             Method::Tss => Self {
                 source: ATLAS_OF_TRIANGLES_SOURCE,
@@ -109,6 +114,7 @@ impl SlotKernels {
                 carry: "carry_triangles",
                 record_bytes: size_of::<TriangleRecord>() as u64,
                 move_bytes: size_of::<TriangleMove>() as u64,
+                carries_shown: true,
             },
         }
     }
@@ -191,20 +197,20 @@ impl Light {
         let layouts = [&gpu_scene.layout, &paths.layout, &own_layout];
         let pipeline =
             |entry| gpu.compute_pipeline(kernels.source, entry, &layouts, &gpu_scene.constants);
-        let carry_layout = layout(
-            gpu,
-            ShaderStages::COMPUTE,
-            &[
-                Binding::Uniform,
-                Binding::Read,
-                Binding::Read,
-                Binding::Read,
-                Binding::Read,
-                Binding::Write,
-                Binding::Write,
-                Binding::Write,
-            ],
-        );
+        let mut carry_bindings = vec![
+            Binding::Uniform,
+            Binding::Read,
+            Binding::Read,
+            Binding::Read,
+            Binding::Read,
+            Binding::Write,
+            Binding::Write,
+            Binding::Write,
+        ];
+        if kernels.carries_shown {
+            carry_bindings.extend([Binding::Read, Binding::Write]);
+        }
+        let carry_layout = layout(gpu, ShaderStages::COMPUTE, &carry_bindings);
         Ok(Self {
             atlas_width: u32::from(size[0]),
             start: pipeline("start_at_texels"),
@@ -220,6 +226,7 @@ impl Light {
             moves: gpu.scratch("moves", most_slots * kernels.move_bytes)?,
             texels,
             texels_before: None,
+            shown_before: None,
             shown,
             parameters,
             kernels,
@@ -282,6 +289,14 @@ impl Light {
                 encoder.copy_buffer_to_buffer(from, 0, to, 0, None);
             }
             self.texels_before = Some(before);
+            if self.kernels.carries_shown {
+                let before = match self.shown_before.take() {
+                    Some(before) => before,
+                    None => gpu.scratch("shown before", self.shown.size())?,
+                };
+                encoder.copy_buffer_to_buffer(&self.shown, 0, &before, 0, None);
+                self.shown_before = Some(before);
+            }
         }
         if placed.reset {
             for buffer in self.texels.buffers() {
@@ -307,11 +322,14 @@ impl Light {
             None => [&self.slots; 3],
         };
         let now = self.texels.buffers();
-        let group = bind(
-            gpu,
-            &self.carry_layout,
-            &[&[&self.carry_parameters, &self.moves], &before[..], &now].concat(),
-        );
+        let mut buffers = [&[&self.carry_parameters, &self.moves], &before[..], &now].concat();
+        if self.kernels.carries_shown {
+            buffers.extend([
+                self.shown_before.as_ref().unwrap_or(&self.slots),
+                &self.shown,
+            ]);
+        }
+        let group = bind(gpu, &self.carry_layout, &buffers);
         let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
         pass.set_pipeline(&self.carry);
         pass.set_bind_group(0, &group, &[]);
@@ -420,6 +438,12 @@ pub fn keeps_texels(old: Slot, new: Slot) -> bool {
         (Slot::Triangle(old), Slot::Triangle(new)) => new.is_laid_like(old),
         _ => false,
     }
+}
+
+/// Whether what is shown of a slot comes along from another one. Blocks mostly move
+/// because their level changes; triangles that others push aside are many.
+pub fn keeps_shown(old: Slot, new: Slot) -> bool {
+    matches!(new, Slot::Triangle(_)) && keeps_texels(old, new)
 }
 
 /// Appends the record of a move, as words.

@@ -1,5 +1,6 @@
 // Gives newly placed triangle slots their first content: the light that the triangle
 // had in its old slot, as it is where texels lie alike, else resampled; or nothing.
+// Where texels lie alike, what is shown of them comes along and need not be made anew.
 // One workgroup per move; reads `before`, a copy of the atlas before any move.
 // The same for blocks: carry.wgsl.
 
@@ -42,6 +43,8 @@ const CARRIED_WEIGHT: f32 = 12.0;
 @group(0) @binding(5) var<storage, read_write> diffuse: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read_write> glossy: array<vec4<f32>>;
 @group(0) @binding(7) var<storage, read_write> moments: array<vec4<f32>>;
+@group(0) @binding(8) var<storage, read> shown_before: array<vec4<f32>>;
+@group(0) @binding(9) var<storage, read_write> shown: array<vec4<f32>>;
 
 struct Remembered {
     diffuse: vec4<f32>,
@@ -105,6 +108,7 @@ fn carry_triangles(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgro
             let there = vec2<u32>(select(here, -here, m.how == TURNED_ROUND) + vec2<i32>(m.offset_x, m.offset_y));
             let source = index_of(there);
             found = Remembered(diffuse_before[source], glossy_before[source], moments_before[source]);
+            shown[at] = shown_before[source];
         }
         diffuse[at] = found.diffuse;
         glossy[at] = found.glossy;

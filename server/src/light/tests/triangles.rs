@@ -131,7 +131,17 @@ fn a_triangle_is_lit_as_itself_and_keeps_its_light_wherever_it_goes() {
         for _ in 0..if old.is_none() { 3 } else { 0 } {
             bench.trace(&job);
         }
-        let shown = bench.shown(&job);
+        if old.is_none() {
+            // A black square remembers no light: now each texel has its own.
+            let own: Vec<[f32; 4]> = (0..u32::from(ATLAS).pow(2))
+                .map(|at| [at as f32, 0.0, 0.0, 3.0])
+                .collect();
+            let diffuse = &bench.light.texels.diffuse;
+            (bench.gpu.queue).write_buffer(diffuse, 0, bytemuck::cast_slice(&own));
+        }
+        // What lies alike is shown already.
+        let alike = [true, true, true, false, false][index];
+        let shown = bench.shown(if alike && old.is_some() { &[] } else { &job });
         let mut compared = 0;
         for (at, texel, owned) in texels(&triangle) {
             if !owned {
@@ -153,10 +163,8 @@ fn a_triangle_is_lit_as_itself_and_keeps_its_light_wherever_it_goes() {
             }
         }
         assert!(compared > 40, "{compared}");
-        let alike = [true, true, true, false, false][index];
         assert_eq!(old.is_none_or(|old| keeps_texels(old, slot)), alike);
         let remembered = bench.remembered(&triangle);
-        assert!(remembered.iter().any(|light| light[0] > 0.0));
         if alike && old.is_some() {
             assert!(remembered == before, "nothing is lost on the way");
         }
