@@ -4,7 +4,7 @@ use std::mem::{offset_of, size_of};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::{atlas, light, picture, tss, visibility};
+use crate::{atlas, light, picture, snake, tss, visibility};
 
 fn module(name: &str, source: &str) -> naga::Module {
     let module = naga::front::wgsl::parse_str(source)
@@ -62,6 +62,8 @@ fn kernels_validate() {
         ("picture", picture::SOURCE),
         ("atlas memory", atlas::SOURCE),
         ("footprint", atlas::FOOTPRINT_SOURCE),
+        ("snake", snake::SOURCE),
+        ("snake footprint", snake::FOOTPRINT_SOURCE),
         ("tss", tss::SOURCE),
         ("measure", tss::MEASURE_SOURCE),
         ("ids", visibility::IDS_SOURCE),
