@@ -67,8 +67,7 @@ impl SnakeFootprints {
         })
     }
 
-    /// Records the measuring; `eyes[n]` is the eye in the space of `ObjectId(n)`, and
-    /// `half_view` the tangent of half the field of view.
+    /// Records the measuring; `eyes[n]` is the eye in the space of `ObjectId(n)`.
     pub fn record(
         &self,
         gpu: &Gpu,
@@ -76,13 +75,11 @@ impl SnakeFootprints {
         gpu_scene: &GpuScene,
         eyes: &[Vec3],
         pixels_per_radian: f32,
-        half_view: f32,
     ) {
         let parameters = SnakeFootprintParameters {
             patch_count: self.patches,
             pixels_per_radian,
-            half_view,
-            padding: 0,
+            padding: [0; 2],
         };
         gpu.queue
             .write_buffer(&self.parameters, 0, bytemuck::bytes_of(&parameters));

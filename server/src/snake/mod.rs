@@ -20,10 +20,7 @@ mod policy;
 #[cfg(test)]
 mod tests;
 
-use shadecast_protocol::{Epoch, PatchId};
 use thiserror::Error;
-
-use crate::atlas::AtlasStats;
 
 pub use footprints::SnakeFootprints;
 pub use place::{KernelTimes, Snake, SnakeTwin};
@@ -38,39 +35,4 @@ pub enum SnakeError {
         .0[0], .0[1]
     )]
     Size([u16; 2]),
-}
-
-/// Where a triangle's corners lie in the atlas, and how it is foreshortened there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct TriangleSlot {
-    /// In eighths of a texel from the atlas's upper left corner, x and then y.
-    pub corners: [[u16; 2]; 3],
-    /// 1/depth of the corners, 65535 the largest.
-    pub weights: [u16; 3],
-}
-
-/// What one frame of the atlas changed. All lists ascend by patch.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Placed {
-    /// The epoch that the placement belongs to.
-    pub epoch: Epoch,
-    /// True when the epoch begins with this frame: nothing that was placed
-    /// before is any longer, and the picture must be an IDR.
-    pub reset: bool,
-    /// True when a bin found no room, and so the atlas was reset.
-    pub out_of_memory: bool,
-    /// What may be seen.
-    pub visible: Vec<(PatchId, u32, Option<TriangleSlot>)>,
-    /// Patches that lose their slot. Empty on a reset, which drops all.
-    pub removals: Vec<PatchId>,
-    /// Patches that get a slot, or another form of it; on a reset, all that have one.
-    pub placements: Vec<(PatchId, TriangleSlot)>,
-    /// Those among the placements that had a slot before: old one, new one.
-    pub moved: Vec<(PatchId, TriangleSlot, TriangleSlot)>,
-    /// Subtracted from log2 of all ideal areas.
-    pub bias: f32,
-    /// Visible patches without a slot, the least important ones.
-    pub unplaced: u32,
-    /// The atlas after the frame.
-    pub stats: AtlasStats,
 }

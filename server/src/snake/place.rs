@@ -6,11 +6,13 @@ use shadecast_protocol::Epoch;
 use shadecast_shaders::snake::{Outcome, Packer, Seen, Superblock};
 
 use super::{
-    Placed,
     passes::{Passes, Threads, kernel_names},
     policy::{Policy, SnakeShape},
 };
-use crate::gpu::{Gpu, GpuError};
+use crate::{
+    atlas::Placed,
+    gpu::{Gpu, GpuError},
+};
 
 /// Kernels in their order, and how long the device took for each.
 pub type KernelTimes = Vec<(&'static str, Duration)>;

@@ -1,13 +1,13 @@
 //! How full the atlas may be, and when it was emptied: what outlives a frame and
 //! needs no kernel.
 
-use shadecast_protocol::{Epoch, PatchId};
+use shadecast_protocol::{Epoch, PatchId, Placement, Slot, TriangleSlot};
 use shadecast_shaders::snake::{
     BIN, NONE, OCTAVE, ODD, Outcome, SIZES, SnakeParameters, Template, bits, status, templates,
 };
 
-use super::{Placed, SnakeError, TriangleSlot};
-use crate::atlas::{AtlasStats, KEEP_UNSEEN};
+use super::SnakeError;
+use crate::atlas::{AtlasStats, KEEP_UNSEEN, Placed, VisiblePatch};
 
 /// Share of the texels that the visible set may cost in an empty atlas, spare slots
 /// (30 %) and ends of rows not counted.
@@ -90,7 +90,7 @@ pub(super) struct Policy {
     /// Steps.
     bias: i32,
     /// Slots, by patch.
-    slots: Vec<Option<TriangleSlot>>,
+    slots: Vec<Option<Slot>>,
 }
 
 impl Policy {
@@ -127,7 +127,8 @@ impl Policy {
         SnakeParameters {
             patch_count,
             budget: share(self.fill),
-            most_triangles: (share(FILL_TARGET) / self.templates[0].cost).max(1),
+            // As many as the light can move in a frame.
+            most_triangles: (self.shape.texels() / 4).max(1),
             bias: self.bias,
             reset: u32::from(self.reset_asked),
             ..self.shape.parameters()
@@ -175,18 +176,22 @@ impl Policy {
                 let template = &self.templates[(active.shape & BIN) as usize];
                 used += u64::from(template.cost);
                 residents += 1;
-                Some(slot(template, active.shape, active.at))
+                Some(Slot::Triangle(slot(template, active.shape, active.at)))
             };
             self.slots[active.patch_id as usize] = after;
             if active.pixels > 0 {
-                placed.visible.push((patch, active.pixels, after));
+                placed.visible.push(VisiblePatch {
+                    patch,
+                    pixels: active.pixels,
+                    slot: after,
+                });
                 placed.unplaced += u32::from(after.is_none());
             }
             match (before, after) {
                 (Some(_), None) if !reset => placed.removals.push(patch),
                 // A bin may have moved to where it was.
                 (_, Some(after)) if is_new && (reset || before != Some(after)) => {
-                    placed.placements.push((patch, after));
+                    placed.placements.push(Placement { patch, slot: after });
                     placed
                         .moved
                         .extend(before.map(|before| (patch, before, after)));
@@ -249,8 +254,10 @@ fn slot(template: &Template, shape: u32, at: u32) -> TriangleSlot {
     } else {
         (smaller, larger)
     };
+    let depths = [15, 20, 25].map(|shift| shape >> shift & 31);
+    let nearest = depths.into_iter().min().unwrap_or(0);
     TriangleSlot {
         corners,
-        weights: [15, 20, 25].map(|shift| weight(shape >> shift & 31)),
+        weights: depths.map(|depth| weight(depth - nearest)),
     }
 }

@@ -2,7 +2,7 @@
 //! `footprint.wgsl`.
 //!
 //! Each triangle has a **virtual camera** at the eye that looks at its middle;
-//! where the triangle reaches out of the field of view or behind the camera, the
+//! where the triangle reaches out of a right angle's view or behind the camera, the
 //! camera stands so far back that it sees all of it. There the edges are measured
 //! in pixels. So the footprint does not depend on where the head looks, and a
 //! triangle about the head has one, too.
@@ -25,14 +25,10 @@ pub struct SnakeFootprintParameters {
     pub patch_count: u32,
     /// In the middle of the eye's picture.
     pub pixels_per_radian: f32,
-    /// Tangent of half the field of view of virtual cameras.
-    pub half_view: f32,
     /// Zero.
-    pub padding: u32,
+    pub padding: [u32; 2],
 }
 
-/// Tangents of half a virtual camera's field of view, at least and at most.
-pub const HALF_VIEWS: [f32; 2] = [0.2, 2.0];
 /// No turn is kept.
 pub const NO_TURN: u32 = 7;
 /// Another edge becomes the base where it is longer by this factor, and the other
@@ -63,11 +59,8 @@ pub fn snake_footprint(
     let right = ahead.cross(side).normalize();
     let up = right.cross(ahead);
     let beside = to.map(|to| vec2(to.dot(right), to.dot(up)));
-    let half_view = parameters.half_view.max(HALF_VIEWS[0]).min(HALF_VIEWS[1]);
     let deep = [0, 1, 2].map(|i| to[i].dot(ahead));
-    let back = (0..3).fold(0.0_f32, |back, i| {
-        back.max(beside[i].length() / half_view - deep[i])
-    });
+    let back = (0..3).fold(0.0_f32, |back, i| back.max(beside[i].length() - deep[i]));
     let depths = deep.map(|depth| (depth + back).max(1e-20));
     let seen = [0, 1, 2].map(|i| beside[i] * (parameters.pixels_per_radian / depths[i]));
     if seen.iter().all(|seen| seen.is_finite()) && depths.iter().all(|depth| depth.is_finite()) {

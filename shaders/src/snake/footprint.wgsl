@@ -5,8 +5,7 @@
 struct SnakeFootprintParameters {
     patch_count: u32,
     pixels_per_radian: f32,
-    half_view: f32,
-    padding: u32,
+    padding: vec2<u32>,
 }
 
 @group(1) @binding(0) var<uniform> footprints: SnakeFootprintParameters;
@@ -66,10 +65,9 @@ fn measure_snake_footprints(@builtin(global_invocation_id) id: vec3<u32>, @built
     ahead = select(vec3<f32>(0.0, 0.0, 1.0), normalize(ahead), is_direction(ahead));
     let right = normalize(cross(ahead, select(vec3<f32>(0.0, 1.0, 0.0), vec3<f32>(1.0, 0.0, 0.0), abs(ahead.x) < 0.7)));
     let up = cross(right, ahead);
-    let half_view = clamp(finite(footprints.half_view), 0.2, 2.0);
     var back = 0.0;
     for (var i = 0u; i < 3u; i++) {
-        back = max(back, length(vec2<f32>(dot(to[i], right), dot(to[i], up))) / half_view - dot(to[i], ahead));
+        back = max(back, length(vec2<f32>(dot(to[i], right), dot(to[i], up))) - dot(to[i], ahead));
     }
     var depths = vec3<f32>(0.0);
     var seen = array<vec2<f32>, 3>();

@@ -39,7 +39,7 @@ pub use bins::{
     BIN, BINS, FORM, LONGEST, OCTAVE, PIXEL, SIZES, Template, Wish, bin_of, is_near, parts,
     size_borders, templates,
 };
-pub use footprint::{HALF_VIEWS, NO_TURN, SnakeFootprintParameters, snake_footprint};
+pub use footprint::{NO_TURN, SnakeFootprintParameters, snake_footprint};
 pub use mapping::map_bin;
 pub use place::{Outcome, Packer, Seen};
 pub use scale::{BIAS_STEP, CELLS, DEAD_BAND, MOST_BIAS, least_bias};

@@ -18,8 +18,7 @@ fn measured(corners: [Vec3; 3], eye: Vec3, pixels_per_radian: f32) -> Wish {
     let parameters = SnakeFootprintParameters {
         patch_count: 1,
         pixels_per_radian,
-        half_view: 1.0,
-        padding: 0,
+        padding: [0; 2],
     };
     snake_footprint(corners, eye, &parameters, NO_TURN)
 }
@@ -38,11 +37,11 @@ fn nothing_visible_is_placed_nowhere() {
 fn four_by_four_texels_are_shared() {
     let mut atlas = Watched::new(shape(4, 4));
     let placed = atlas.place(&[seen(3, 500.0, 900.0)]);
-    assert!((1..=16).contains(&texels_of(&placed.placements[0].1).len()));
+    assert!((1..=16).contains(&texels_of(placed.placements[0].slot).len()));
     let placed = atlas.place(&view(&mut Noise(1), 2, [0.0, 9.0]));
     assert_eq!(placed.unplaced, 0);
     let placed = atlas.place(&view(&mut Noise(1), 100, [0.0, 9.0]));
-    assert_eq!((placed.unplaced, placed.stats.patches), (91, 9));
+    assert_eq!((placed.unplaced, placed.stats.patches), (96, 4));
 }
 
 #[test]
@@ -65,8 +64,8 @@ fn footprints_that_are_no_numbers_get_the_smallest_slot() {
         .collect();
     let placed = Watched::new(shape(64, 64)).place(&visible);
     assert_eq!(placed.unplaced, 0);
-    for (patch, slot) in &placed.placements {
-        assert_eq!(texels_of(slot).len(), 1, "{patch:?}");
+    for placement in &placed.placements {
+        assert_eq!(texels_of(placement.slot).len(), 1, "{placement:?}");
     }
     let flat = measured(line, Vec3::ZERO, 500.0);
     assert!(flat.height < 100 && flat.length > 3000, "{flat:?}");
@@ -147,8 +146,8 @@ fn millions() -> Vec<Seen> {
         .collect()
 }
 
-/// 60 % of the atlas, in slots of a texel.
-const MOST_OF_MILLIONS: u32 = 629_145;
+/// A quarter of the texels.
+const MOST_OF_MILLIONS: u32 = 1 << 18;
 
 #[test]
 fn four_million_triangles_leave_out_the_least_important() {
@@ -160,8 +159,8 @@ fn four_million_triangles_leave_out_the_least_important() {
         let those = placed
             .visible
             .iter()
-            .filter(move |(.., slot)| slot.is_some() == is_placed);
-        those.map(|(_, pixels, _)| *pixels)
+            .filter(move |found| found.slot.is_some() == is_placed);
+        those.map(|found| found.pixels)
     };
     // Within one class of importance, here up to four pixels, the first come first.
     assert!(of(false).max() <= of(true).min().map(|pixels| pixels + 4));

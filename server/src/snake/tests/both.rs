@@ -6,17 +6,17 @@ use proptest::test_runner::{Config, TestRunner};
 use shadecast_shaders::snake::{Seen, Wish};
 
 use super::{
-    super::{Placed, SnakeShape, SnakeTwin, passes::Threads, place::Snake},
+    super::{SnakeShape, SnakeTwin, passes::Threads, place::Snake},
     any_frames, nearer, seen, shape, view,
     watched::Told,
 };
 use crate::{
-    atlas::{KEEP_UNSEEN, tests::watched::Noise},
+    atlas::{KEEP_UNSEEN, Placed, tests::watched::Noise},
     gpu::Gpu,
 };
 
 /// Random sequences of frames for each shape of atlas.
-const SEQUENCES: u32 = 100;
+const SEQUENCES: u32 = 60;
 
 /// An atlas on the GPU beside its twin, and what a client knows of both.
 pub(super) struct Both {

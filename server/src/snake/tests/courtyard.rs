@@ -3,38 +3,19 @@
 use std::{collections::HashSet, time::Duration};
 
 use glam::{Quat, Vec3};
-use shadecast_protocol::{ClientTime, EyeView, Fov, PatchShape, Pose, ViewReport, ViewSeq};
+use shadecast_protocol::{ClientTime, EyeView, Fov, Method, Pose, ViewReport, ViewSeq};
 
 use super::{
     super::{Snake, SnakeFootprints, SnakeShape},
-    watched::texels_of,
+    watched::{texels_of, triangle},
 };
 use crate::{
     atlas::{Atlas, AtlasShape, Footprints},
     gpu::{Gpu, GpuScene, Integrator},
-    patches::{self, Patch, PatchLimits, PatchedScene},
+    patches::{self, PatchLimits},
     scene::{Scene, courtyard},
     visibility::{Prediction, Visibility, eye_of},
 };
-
-/// Every triangle by itself.
-fn single(mut scene: PatchedScene) -> PatchedScene {
-    let mut patches = Vec::new();
-    for patch in &scene.patches {
-        for k in 0..patch.shape.triangles().len() as u32 {
-            let triangle = &scene.scene.triangles[(patch.first_triangle + k) as usize];
-            let [a, b, c] = triangle.positions;
-            patches.push(Patch {
-                shape: PatchShape::Solo,
-                corners: [a, b, c, c, c],
-                first_triangle: patch.first_triangle + k,
-                ..*patch
-            });
-        }
-    }
-    scene.patches = patches;
-    scene
-}
 
 /// A head that walks at a metre a second and turns by 20 degrees a second.
 fn view(scene: &Scene, seconds: f32) -> ViewReport {
@@ -65,7 +46,8 @@ fn a_walk_through_the_courtyard_wastes_little() {
     for side in [512_u16, 1024] {
         let gpu = Gpu::open().expect("a GPU");
         let cut = patches::cut(courtyard(15_000), PatchLimits::for_atlas(64, 400.0));
-        let scene = single(cut.clone());
+        let limits = PatchLimits::for_atlas(64, 400.0);
+        let scene = patches::cut_for(Method::Snake, courtyard(15_000), limits);
         let integrator = Integrator::with_bounces(0);
         let gpu_scene =
             GpuScene::new(&gpu, &scene.scene, integrator, &mut |_| ()).expect("a scene");
@@ -75,12 +57,13 @@ fn a_walk_through_the_courtyard_wastes_little() {
         let mut snake = Snake::new(&gpu, shape, count, visibility.pixels()).expect("room");
         let pass = SnakeFootprints::new(&gpu, &gpu_scene, &scene, visibility.pixels(), &snake)
             .expect("room");
-        let mut by_patch = Visibility::new(&gpu, &gpu_scene, &cut).expect("room");
+        let cut_scene = GpuScene::new(&gpu, &cut.scene, integrator, &mut |_| ()).expect("a scene");
+        let mut by_patch = Visibility::new(&gpu, &cut_scene, &cut).expect("room");
         let sas_shape = AtlasShape::new([side; 2], 64).expect("a size");
         let mut sas =
             Atlas::new(&gpu, sas_shape, cut.patches.len() as u32, by_patch.pixels()).expect("room");
         let sas_pass =
-            Footprints::new(&gpu, &gpu_scene, &cut, by_patch.pixels(), sas.wishes()).expect("room");
+            Footprints::new(&gpu, &cut_scene, &cut, by_patch.pixels(), sas.wishes()).expect("room");
         let poses: Vec<Pose> = scene
             .scene
             .objects
@@ -101,17 +84,10 @@ fn a_walk_through_the_courtyard_wastes_little() {
             };
             let mut commands = encoder();
             visibility.record(&gpu, &mut commands, &gpu_scene, &prediction, &poses);
-            pass.record(
-                &gpu,
-                &mut commands,
-                &gpu_scene,
-                &eyes,
-                pixels_per_radian,
-                1.0,
-            );
+            pass.record(&gpu, &mut commands, &gpu_scene, &eyes, pixels_per_radian);
             let placed = snake.place(&gpu, commands).expect("a GPU");
             let mut commands = encoder();
-            by_patch.record(&gpu, &mut commands, &gpu_scene, &prediction, &poses);
+            by_patch.record(&gpu, &mut commands, &cut_scene, &prediction, &poses);
             sas_pass.record(&gpu, &mut commands, &gpu_scene, &eyes, pixels_per_radian);
             let by_sas = sas.place(&gpu, commands).expect("a GPU");
             assert_eq!(placed.unplaced, 0);
@@ -120,20 +96,21 @@ fn a_walk_through_the_courtyard_wastes_little() {
             let slots: Vec<_> = placed
                 .visible
                 .iter()
-                .filter_map(|(.., slot)| *slot)
+                .filter_map(|visible| visible.slot)
                 .collect();
             let useful: f64 = slots
                 .iter()
                 .map(|slot| {
-                    let [a, b, c] = slot.corners.map(|corner| corner.map(f64::from));
+                    let [a, b, c] = triangle(*slot).corners.map(|corner| corner.map(f64::from));
                     ((b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])).abs() / 128.0
                 })
                 .sum();
             sum += placed.stats.used_fraction();
             useful_sum += useful;
             if turn % 30 == 0 || turn == 89 {
-                let owned: usize = slots.iter().map(|slot| texels_of(slot).len()).sum();
-                let distinct: HashSet<_> = slots.iter().map(|slot| slot.corners).collect();
+                let owned: usize = slots.iter().map(|slot| texels_of(*slot).len()).sum();
+                let distinct: HashSet<_> =
+                    slots.iter().map(|slot| triangle(*slot).corners).collect();
                 assert_eq!(distinct.len(), slots.len());
                 println!(
                     "{side} frame {turn}: {} seen, bias {}, useful {useful:.0}, owned {owned}, {:?}",

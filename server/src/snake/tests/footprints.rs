@@ -32,15 +32,14 @@ fn both(
     let mut encoder = gpu
         .device
         .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-    pass.record(gpu, &mut encoder, gpu_scene, &eyes, pixels_per_radian, 1.0);
+    pass.record(gpu, &mut encoder, gpu_scene, &eyes, pixels_per_radian);
     gpu.queue.submit([encoder.finish()]);
     let bytes = 0..snake.wishes().size();
     let words: Vec<[u32; 2]> = gpu.read(snake.wishes(), bytes).expect("a GPU");
     let parameters = SnakeFootprintParameters {
         patch_count: count as u32,
         pixels_per_radian,
-        half_view: 1.0,
-        padding: 0,
+        padding: [0; 2],
     };
     let twin = scene.patches.iter().map(|patch| {
         let first = &scene.scene.triangles[patch.first_triangle as usize];

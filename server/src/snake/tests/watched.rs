@@ -2,15 +2,24 @@
 
 use std::collections::HashMap;
 
-use shadecast_protocol::{Epoch, PatchId};
+use shadecast_protocol::{Epoch, PatchId, Placement, Slot, TriangleSlot};
 use shadecast_shaders::snake::Seen;
 
-use super::super::{Placed, SnakeShape, SnakeTwin, TriangleSlot};
+use super::super::{SnakeShape, SnakeTwin};
+use crate::atlas::Placed;
+
+/// The triangle of a slot.
+pub(super) fn triangle(slot: Slot) -> TriangleSlot {
+    match slot {
+        Slot::Triangle(slot) => slot,
+        Slot::Block(block) => panic!("{block:?} is no triangle"),
+    }
+}
 
 /// Texels that belong to a slot: those about whose centre an open square of two
 /// texels meets the triangle, and so all that bilinear lookups in it may touch.
-pub(super) fn texels_of(slot: &TriangleSlot) -> Vec<[i64; 2]> {
-    let corners = slot.corners.map(|corner| corner.map(i64::from));
+pub(super) fn texels_of(slot: Slot) -> Vec<[i64; 2]> {
+    let corners = triangle(slot).corners.map(|corner| corner.map(i64::from));
     let range = |axis: usize| {
         let sides = corners.map(|corner| corner[axis]);
         let (low, high) = (sides.iter().min(), sides.iter().max());
@@ -21,7 +30,9 @@ pub(super) fn texels_of(slot: &TriangleSlot) -> Vec<[i64; 2]> {
             let on = |p: [i64; 2]| p[0] * n[0] + p[1] * n[1];
             let [a, b, c] = corners.map(on);
             let reach = 8 * (n[0].abs() + n[1].abs());
-            a.max(b).max(c) > on(centre) - reach && a.min(b).min(c) < on(centre) + reach
+            // An edge without length separates nothing.
+            reach == 0
+                || a.max(b).max(c) > on(centre) - reach && a.min(b).min(c) < on(centre) + reach
         };
         let normal = |from: usize, to: usize| {
             let [x, y] = [0, 1].map(|side| corners[to][side] - corners[from][side]);
@@ -35,7 +46,12 @@ pub(super) fn texels_of(slot: &TriangleSlot) -> Vec<[i64; 2]> {
     };
     let (columns, rows) = (range(0), range(1));
     rows.flat_map(|y| columns.clone().map(move |x| [x, y]))
-        .filter(|[x, y]| meets([8 * x + 4, 8 * y + 4]))
+        .filter(|&[x, y]| {
+            let is_own = meets([8 * x + 4, 8 * y + 4]);
+            // What the light and the client take for the slot's own.
+            assert_eq!(is_own, x >= 0 && y >= 0 && slot.owns(x as u32, y as u32));
+            is_own
+        })
         .collect()
 }
 
@@ -43,7 +59,7 @@ pub(super) fn texels_of(slot: &TriangleSlot) -> Vec<[i64; 2]> {
 pub(super) struct Told {
     shape: SnakeShape,
     epoch: Epoch,
-    known: HashMap<PatchId, TriangleSlot>,
+    known: HashMap<PatchId, Slot>,
 }
 
 impl Told {
@@ -69,10 +85,11 @@ impl Told {
         for patch in &placed.removals {
             assert!(self.known.remove(patch).is_some(), "{patch:?} had no slot");
         }
-        assert!(placed.placements.is_sorted_by(|a, b| a.0 < b.0));
+        assert!(placed.placements.is_sorted_by(|a, b| a.patch < b.patch));
         let mut moved = Vec::new();
-        for &(patch, slot) in &placed.placements {
-            assert!(slot.weights.iter().all(|&weight| weight > 0));
+        for &Placement { patch, slot } in &placed.placements {
+            let weights = triangle(slot).weights;
+            assert!(weights.contains(&u16::MAX) && !weights.contains(&0));
             self.known.insert(patch, slot);
             moved.extend(before.get(&patch).map(|&old| (patch, old, slot)));
         }
@@ -83,11 +100,11 @@ impl Told {
         }
         assert_eq!(placed.stats.patches as usize, self.known.len());
         assert_eq!(placed.visible.len(), visible.len());
-        for (seen, &(patch, pixels, slot)) in visible.iter().zip(&placed.visible) {
-            assert_eq!((patch.0, pixels), (seen.patch, seen.pixels));
-            assert_eq!(slot, self.known.get(&patch).copied());
+        for (seen, found) in visible.iter().zip(&placed.visible) {
+            assert_eq!((found.patch.0, found.pixels), (seen.patch, seen.pixels));
+            assert_eq!(found.slot, self.known.get(&found.patch).copied());
         }
-        let holes = placed.visible.iter().filter(|(.., slot)| slot.is_none());
+        let holes = placed.visible.iter().filter(|found| found.slot.is_none());
         assert_eq!(holes.count(), placed.unplaced as usize);
         self.check_texels(placed);
     }
@@ -98,7 +115,7 @@ impl Told {
         let [width, height] = self.shape.size().map(i64::from);
         let mut owner: Vec<Option<PatchId>> = vec![None; (width * height) as usize];
         for (patch, slot) in &self.known {
-            for [x, y] in texels_of(slot) {
+            for [x, y] in texels_of(*slot) {
                 assert!(
                     (0..width).contains(&x) && (0..height).contains(&y),
                     "{slot:?} sticks out"
