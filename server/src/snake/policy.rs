@@ -14,8 +14,9 @@ use crate::atlas::{AtlasStats, KEEP_UNSEEN, Placed, VisiblePatch};
 pub const FILL_TARGET: f32 = 0.6;
 /// The fill target never falls below this.
 const LEAST_FILL: f32 = 0.1;
-/// Frames between two resets below which the second is too soon.
-const RESET_SPACING: u32 = 5;
+/// Frames between two resets below which the second is too soon: a second at 30
+/// updates. A reset moves every triangle, so that room is better left free.
+const RESET_SPACING: u32 = 30;
 /// A reset that comes too soon multiplies the fill target by this.
 const FILL_AFTER_EARLY_RESET: f32 = 0.85;
 /// What a frame without a reset adds to the fill target, up to [`FILL_TARGET`].
@@ -35,7 +36,7 @@ impl SnakeShape {
     /// # Errors
     /// When not a single superblock fits, or a side is odd or too long.
     pub fn new(size: [u16; 2]) -> Result<Self, SnakeError> {
-        let is_valid = |side: u16| side % 2 == 0 && (4..=8190).contains(&side);
+        let is_valid = |side: u16| side.is_multiple_of(2) && (4..=8190).contains(&side);
         if size.into_iter().all(is_valid) {
             Ok(Self { size })
         } else {
@@ -109,6 +110,7 @@ impl Policy {
         }
     }
 
+    #[cfg(test)]
     pub(super) fn shape(&self) -> SnakeShape {
         self.shape
     }
@@ -249,7 +251,7 @@ fn slot(template: &Template, shape: u32, at: u32) -> TriangleSlot {
     let turn = (shape >> 12 & 7) as usize;
     let mut corners = [tip; 3];
     let (after, before) = ((turn / 2 + 1) % 3, (turn / 2 + 2) % 3);
-    (corners[after], corners[before]) = if turn % 2 == 0 {
+    (corners[after], corners[before]) = if turn.is_multiple_of(2) {
         (larger, smaller)
     } else {
         (smaller, larger)

@@ -311,7 +311,7 @@ const fn log2_fixed(x: u64) -> i32 {
     let mut log = octave as i32;
     let mut bit = 0;
     while bit < 8 {
-        mantissa = mantissa * mantissa >> 62;
+        mantissa = (mantissa * mantissa) >> 62;
         log *= 2;
         if mantissa >> 63 != 0 {
             mantissa >>= 1;

@@ -129,8 +129,8 @@ impl Packer {
         } else {
             self.frozen_for = 0;
         }
-        let (counts, plans) = self.make_room(&mut active, parameters, &mut outcome);
-        self.assign(&mut active, &counts, &plans, parameters);
+        let plans = self.make_room(&mut active, parameters, &mut outcome);
+        self.assign(&mut active, &plans, parameters);
 
         self.residents = active.iter().map(|active| active.record).collect();
         self.residents.retain(|record| record.shape != NONE);
@@ -209,12 +209,12 @@ impl Packer {
         active: &mut [Active],
         parameters: &SnakeParameters,
         outcome: &mut Outcome,
-    ) -> (Vec<Count>, Vec<Plan>) {
+    ) -> Vec<Plan> {
         self.superblocks.begin();
         if parameters.reset == 0 {
             let counts = self.request(active, parameters, outcome, false);
             if let Ok(plans) = self.lay_bins(&counts, outcome.status & status::FROZEN != 0) {
-                return (counts, plans);
+                return plans;
             }
             outcome.status |= status::FULL;
         }
@@ -226,7 +226,7 @@ impl Packer {
             self.places.fill(None);
             let counts = self.request(active, parameters, outcome, true);
             let raise = match (self.lay_bins(&counts, false), raises.next()) {
-                (Ok(plans), _) | (Err(plans), None) => return (counts, plans),
+                (Ok(plans), _) | (Err(plans), None) => return plans,
                 (Err(_), Some(raise)) => raise,
             };
             let before = outcome.bias;
@@ -365,13 +365,7 @@ impl Packer {
     }
 
     /// Each triangle that wants a slot gets the next free one of its bin.
-    fn assign(
-        &mut self,
-        active: &mut [Active],
-        counts: &[Count],
-        plans: &[Plan],
-        parameters: &SnakeParameters,
-    ) {
+    fn assign(&mut self, active: &mut [Active], plans: &[Plan], parameters: &SnakeParameters) {
         let slots = |bin: usize| self.places[bin].map_or(0, |place| place.capacity as usize);
         let mut taken: Vec<Vec<bool>> = (0..BINS).map(|bin| vec![false; slots(bin)]).collect();
         for active in active.iter_mut() {
@@ -387,7 +381,6 @@ impl Packer {
                 self.set_slot(record, active.bin, parameters);
             }
         }
-        debug_assert!(counts.len() == taken.len());
         let mut next = vec![0_usize; BINS];
         for active in active.iter_mut().filter(|active| active.is(bits::WANTED)) {
             let bin = active.bin as usize;
