@@ -17,11 +17,14 @@ pub enum Method {
     /// Tessellated Shading Streaming (Hladky et al., 2019): each triangle by itself,
     /// placed anew for every picture.
     Tss,
+    /// SnakeBinning (Hladky et al., 2021): each triangle by itself, among others of its
+    /// shape, in a slot that stays.
+    Snake,
 }
 
 impl Method {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Sas, Self::Tss];
+    pub const ALL: [Self; 3] = [Self::Sas, Self::Tss, Self::Snake];
 
     /// Its name on a command line.
     #[must_use]
@@ -29,6 +32,7 @@ impl Method {
         match self {
             Self::Sas => "sas",
             Self::Tss => "tss",
+            Self::Snake => "snake",
         }
     }
 
@@ -37,7 +41,7 @@ impl Method {
     pub fn places(self, slot: Slot) -> bool {
         match self {
             Self::Sas => matches!(slot, Slot::Block(_)),
-            Self::Tss => matches!(slot, Slot::Triangle(_)),
+            Self::Tss | Self::Snake => matches!(slot, Slot::Triangle(_)),
         }
     }
 }

@@ -131,7 +131,7 @@ pub(crate) enum Environment {
 pub(crate) struct ServeArguments {
     #[command(flatten)]
     pub(crate) scene: SceneArguments,
-    /// How the light is placed in the atlas: sas (patches in blocks that stay) or tss (triangles by themselves, anew for every picture)
+    /// How the light is placed in the atlas: sas (patches in blocks that stay), snake (triangles by their shape, in slots that stay) or tss (triangles by themselves, anew for every picture)
     #[arg(long, default_value_t)]
     pub(crate) method: Method,
     /// Address and port to listen on; port 0 takes a free one

@@ -18,6 +18,7 @@ use crate::{
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
     scene::{Material, Scene, SceneFacts},
+    snake::SnakeError,
     visibility::{Prediction, Visibility, eye_of},
 };
 
@@ -103,6 +104,9 @@ pub enum FrameError {
     /// The atlas cannot be as asked.
     #[error(transparent)]
     Atlas(#[from] AtlasError),
+    /// The same, of the method `snake`.
+    #[error(transparent)]
+    Snake(#[from] SnakeError),
 }
 
 /// Everything that outlives a frame.

@@ -15,6 +15,7 @@ pub mod patches;
 mod picture;
 pub mod scene;
 mod session;
+pub mod snake;
 pub mod still;
 mod tss;
 mod visibility;

@@ -9,6 +9,7 @@ use crate::{
     frame::FrameError,
     gpu::{Gpu, GpuError, GpuScene},
     patches::PatchedScene,
+    snake::{Snake, SnakeFootprints, SnakeShape},
     tss::Tss,
 };
 
@@ -24,6 +25,13 @@ pub enum Packer {
     },
     /// Triangles, anew for every picture.
     Tss(Tss),
+    /// Triangles by their shape, in slots that stay.
+    Snake {
+        /// What triangles deserve.
+        footprints: SnakeFootprints,
+        /// Who has which slot.
+        snake: Snake,
+    },
 }
 
 impl Packer {
@@ -48,6 +56,12 @@ impl Packer {
                 Self::Sas { footprints, atlas }
             }
             Method::Tss => Self::Tss(Tss::new(gpu, gpu_scene, scene, size, pixels)?),
+            Method::Snake => {
+                let shape = SnakeShape::new(size)?;
+                let snake = Snake::new(gpu, shape, scene.patches.len() as u32, pixels)?;
+                let footprints = SnakeFootprints::new(gpu, gpu_scene, scene, pixels, &snake)?;
+                Self::Snake { footprints, snake }
+            }
         })
     }
 
@@ -56,6 +70,7 @@ impl Packer {
         match self {
             Self::Sas { atlas, .. } => atlas.force_reset(),
             Self::Tss(tss) => tss.force_reset(),
+            Self::Snake { snake, .. } => snake.force_reset(),
         }
     }
 
@@ -78,6 +93,10 @@ impl Packer {
                 atlas.place(gpu, encoder)
             }
             Self::Tss(tss) => tss.place(gpu, gpu_scene, encoder, eyes, pixels_per_radian),
+            Self::Snake { footprints, snake } => {
+                footprints.record(gpu, &mut encoder, gpu_scene, eyes, pixels_per_radian);
+                snake.place(gpu, encoder)
+            }
         }
     }
 }

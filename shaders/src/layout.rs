@@ -4,7 +4,7 @@ use std::mem::{offset_of, size_of};
 
 use naga::valid::{Capabilities, ValidationFlags, Validator};
 
-use crate::{atlas, light, picture, tss, visibility};
+use crate::{atlas, light, picture, snake, tss, visibility};
 
 fn module(name: &str, source: &str) -> naga::Module {
     let module = naga::front::wgsl::parse_str(source)
@@ -62,6 +62,8 @@ fn kernels_validate() {
         ("picture", picture::SOURCE),
         ("atlas memory", atlas::SOURCE),
         ("footprint", atlas::FOOTPRINT_SOURCE),
+        ("snake", snake::SOURCE),
+        ("snake footprint", snake::FOOTPRINT_SOURCE),
         ("tss", tss::SOURCE),
         ("measure", tss::MEASURE_SOURCE),
         ("ids", visibility::IDS_SOURCE),
@@ -327,6 +329,68 @@ fn layouts_of_tss_match() {
         patch_count,
         pixels_per_radian,
         keep_unseen,
+        padding
+    );
+}
+
+#[test]
+fn layouts_of_the_snake_match() {
+    use snake::{ActiveTriangle, SnakeFootprintParameters, SnakeParameters, SnakeState, Template};
+    let packing = module("snake", snake::SOURCE);
+    same_layout!(
+        &packing,
+        SnakeParameters,
+        patch_count,
+        width,
+        units,
+        unit,
+        least_width,
+        largest,
+        budget,
+        most_triangles,
+        keep_unseen,
+        bias,
+        reset,
+        padding
+    );
+    same_layout!(
+        &packing,
+        ActiveTriangle,
+        patch_id,
+        pixels,
+        bits,
+        shape,
+        index,
+        at
+    );
+    same_layout!(
+        &packing, Template, height, length, tip, same, to_odd, to_even, cost, logs
+    );
+    // The kernels' state goes on behind what is read back.
+    let (size, found) = members(&packing, "SnakeState");
+    assert_eq!(u64::from(size), SnakeState::BYTES);
+    let places = [
+        ("bias", offset_of!(SnakeState, bias)),
+        ("status", offset_of!(SnakeState, status)),
+        ("superblock_count", offset_of!(SnakeState, superblock_count)),
+        ("reserved", offset_of!(SnakeState, reserved)),
+        ("bins", offset_of!(SnakeState, bins)),
+        ("slots", offset_of!(SnakeState, slots)),
+        ("raised", offset_of!(SnakeState, raised)),
+        ("superblocks", offset_of!(SnakeState, superblocks)),
+        ("rows", size_of::<SnakeState>()),
+    ];
+    for (name, offset) in places {
+        assert!(found.contains(&(name.to_owned(), offset as u32)), "{name}");
+    }
+    let tally = members(&packing, "SnakeTally").0;
+    assert_eq!(u64::from(tally), 4 * snake::TALLY_WORDS);
+    let footprint = module("snake footprint", snake::FOOTPRINT_SOURCE);
+    same_layout!(
+        &footprint,
+        SnakeFootprintParameters,
+        patch_count,
+        pixels_per_radian,
         padding
     );
 }

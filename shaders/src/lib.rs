@@ -8,6 +8,7 @@
 pub mod atlas;
 pub mod light;
 pub mod picture;
+pub mod snake;
 pub mod tss;
 pub mod visibility;
 

@@ -36,12 +36,14 @@ fn frames_take_effect_whole_and_a_seed_is_a_run() {
 #[test]
 #[ignore = "needs a Vulkan driver"]
 fn triangles_by_themselves_take_the_same_way() {
-    let first = run(Method::Tss, 1, None);
-    picture_and_update_take_effect_together(Method::Tss, &first);
-    let shown = first.presented().last().expect("frames");
-    assert!(shown.foreshortened);
-    let second = run(Method::Tss, 1, None);
-    runs_are_the_same(&first, &second);
+    for method in [Method::Tss, Method::Snake] {
+        let first = run(method, 1, None);
+        picture_and_update_take_effect_together(method, &first);
+        let shown = first.presented().last().expect("frames");
+        assert!(shown.foreshortened);
+        let second = run(method, 1, None);
+        runs_are_the_same(&first, &second);
+    }
 }
 
 /// Byte for byte.

@@ -21,7 +21,7 @@ mod passes;
 mod place;
 mod policy;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use shadecast_protocol::{Epoch, PatchId, Placement, Slot};
 use thiserror::Error;

@@ -4,7 +4,7 @@
 mod bad_input;
 mod both;
 mod footprints;
-mod watched;
+pub(crate) mod watched;
 
 use proptest::prelude::*;
 use shadecast_shaders::atlas::{OCTAVE, Seen, Wish};

@@ -110,7 +110,7 @@ impl SlotKernels {
                 move_bytes: size_of::<Move>() as u64,
                 carries_shown: false,
             },
-            Method::Tss => Self {
+            Method::Tss | Method::Snake => Self {
                 source: ATLAS_OF_TRIANGLES_SOURCE,
                 carry_source: CARRY_TRIANGLES_SOURCE,
                 carry: "carry_triangles",

@@ -185,7 +185,7 @@ pub fn cut_for(method: Method, mut scene: Scene, limits: PatchLimits) -> Patched
 
     let groups = match method {
         Method::Sas => grouping::group(&adjacency::Adjacency::new(&scene)),
-        Method::Tss => (0..scene.triangles.len() as u32)
+        Method::Tss | Method::Snake => (0..scene.triangles.len() as u32)
             .map(grouping::Group::Solo)
             .collect(),
     };

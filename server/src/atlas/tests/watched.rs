@@ -8,17 +8,17 @@ use super::super::{AtlasShape, AtlasStats, AtlasTwin, Placed};
 use shadecast_protocol::{Block, Epoch, PatchId, Placement, Slot};
 
 /// A small seeded sequence (xorshift), so that plain tests need no crate.
-pub(super) struct Noise(pub(super) u64);
+pub(crate) struct Noise(pub(crate) u64);
 
 impl Noise {
-    pub(super) fn below(&mut self, end: u32) -> u32 {
+    pub(crate) fn below(&mut self, end: u32) -> u32 {
         self.0 ^= self.0 << 13;
         self.0 ^= self.0 >> 7;
         self.0 ^= self.0 << 17;
         (self.0 >> 33) as u32 % end
     }
 
-    pub(super) fn between(&mut self, low: f32, high: f32) -> f32 {
+    pub(crate) fn between(&mut self, low: f32, high: f32) -> f32 {
         low + (high - low) * self.below(1 << 16) as f32 / 65536.0
     }
 }

@@ -1,0 +1,322 @@
+//! The kernels of the snake, in their order, and the buffers between them.
+
+use shadecast_shaders::snake::{
+    ActiveTriangle, BINS, MOST_SUPERBLOCKS, NONE, RAISES, SOURCE, SnakeParameters, SnakeState,
+    TALLY_WORDS, UNIT_WORDS, templates,
+};
+use wgpu::ShaderStages;
+
+use super::policy::SnakeShape;
+use crate::gpu::{Binding, Gpu, GpuError, bind, layout, workgroups};
+
+/// Threads of a group, where a thread has a run of triangles.
+const GROUP: u32 = 64;
+
+/// How the work is shared among threads. Results do not depend on it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Threads {
+    /// Consecutive triangles of one thread.
+    pub(super) run: u32,
+    /// Threads of a group that sums up: a power of two up to 256.
+    pub(super) lanes: u32,
+}
+
+impl Threads {
+    /// As for blocks: see `atlas::passes`.
+    pub(super) fn best(gpu: &Gpu) -> Self {
+        let [run, lanes] = if gpu.is_software { [128, 8] } else { [32, 256] };
+        Self { run, lanes }
+    }
+}
+
+/// More triangles than last frame that the first copy back has room for.
+const SPARE: u32 = 1024;
+/// Bytes of the state that are read back.
+const STATE: u64 = size_of::<SnakeState>() as u64;
+/// Bytes of a triangle in the list that is read back.
+const ACTIVE: u64 = size_of::<ActiveTriangle>() as u64;
+
+/// How many groups a kernel gets.
+#[derive(Clone, Copy, Debug)]
+enum Groups {
+    /// A thread for each run of triangles.
+    Runs,
+    /// A thread for each bin.
+    Bins,
+    /// One for each digit that is sorted by.
+    Digits,
+    /// One.
+    One,
+}
+
+/// Times that bins are asked for: with what is, in an empty atlas, and with larger
+/// biases. Each but the first returns at once where it is not needed.
+const ATTEMPTS: usize = 2 + RAISES.len();
+const BEFORE: [(&str, Groups); 5] = [
+    ("count_active", Groups::Runs),
+    ("scan_active", Groups::One),
+    ("gather", Groups::Runs),
+    ("leave_out", Groups::One),
+    ("choose_scale", Groups::One),
+];
+const ATTEMPT: [(&str, Groups); 4] = [
+    ("choose_bins", Groups::Runs),
+    ("map_bins", Groups::Bins),
+    ("choose_targets", Groups::Runs),
+    ("superblocks", Groups::One),
+];
+const AFTER: [(&str, Groups); 10] = [
+    ("scan_slots", Groups::One),
+    ("mark_taken", Groups::Runs),
+    ("scan_taken", Groups::One),
+    ("count_low", Groups::Runs),
+    ("scan_low", Groups::Digits),
+    ("scatter_low", Groups::Runs),
+    ("count_high", Groups::Runs),
+    ("scan_high", Groups::Digits),
+    ("scatter_high", Groups::Runs),
+    ("assign", Groups::Runs),
+];
+
+/// The kernels of a frame.
+fn frame() -> impl Iterator<Item = (&'static str, Groups)> {
+    let attempts = std::iter::repeat_n(ATTEMPT, ATTEMPTS).flatten();
+    BEFORE.into_iter().chain(attempts).chain(AFTER)
+}
+
+/// Names of the kernels of a frame, in their order.
+pub(super) fn kernel_names() -> impl Iterator<Item = &'static str> {
+    frame().map(|(name, _)| name)
+}
+
+/// Everything of the snake that lies on the GPU.
+#[derive(Debug)]
+pub(super) struct Passes {
+    kernels: Vec<(wgpu::ComputePipeline, Groups)>,
+    group: wgpu::BindGroup,
+    parameters: wgpu::Buffer,
+    wishes: wgpu::Buffer,
+    slots: wgpu::Buffer,
+    active: wgpu::Buffer,
+    tally: wgpu::Buffer,
+    taken: wgpu::Buffer,
+    state: wgpu::Buffer,
+    readback: wgpu::Buffer,
+    patches: u32,
+    run: u32,
+    /// Triangles that the next copy back has room for.
+    expected: u32,
+}
+
+impl Passes {
+    pub(super) fn new(
+        gpu: &Gpu,
+        shape: SnakeShape,
+        patches: u32,
+        pixels: &wgpu::Buffer,
+        threads: Threads,
+    ) -> Result<Self, GpuError> {
+        let Threads { run, lanes } = threads;
+        let of_patches = |bytes: u64| u64::from(patches.max(1)) * bytes;
+        let runs = u64::from(patches.div_ceil(run).max(1));
+        let parameters = gpu.uniform("snake parameters", size_of::<SnakeParameters>());
+        let wishes = gpu.scratch("wishes of triangles", of_patches(8))?;
+        let templates = gpu.storage("footprints of bins", bytemuck::cast_slice(&templates()))?;
+        let slots = gpu.scratch("slots of triangles", of_patches(8))?;
+        let active = gpu.scratch("active triangles", of_patches(ACTIVE))?;
+        let counts = gpu.scratch("active triangles of runs", runs * 16)?;
+        let digits = gpu.scratch("digits of bins", (runs + 1) * 64 * 4)?;
+        let tally = gpu.scratch("tally of the snake", TALLY_WORDS * 4)?;
+        let state = gpu.scratch("state of the snake", SnakeState::BYTES)?;
+        let plans = gpu.scratch("plans of bins", BINS as u64 * 16)?;
+        let listed = gpu.scratch("lists of runs", of_patches(4))?;
+        let requests = gpu.scratch("requests", of_patches(4))?;
+        // A slot has a texel at least, and each bin begins with a word of its own.
+        let words = u64::from(shape.texels() / 32) + BINS as u64;
+        let taken = gpu.scratch("slots in use", words * 4)?;
+        let free_before = gpu.scratch("free slots", words * 4)?;
+
+        let [read, write] = [Binding::Read, Binding::Write];
+        let own_layout = layout(
+            gpu,
+            ShaderStages::COMPUTE,
+            &[
+                Binding::Uniform,
+                read,
+                read,
+                read,
+                write,
+                write,
+                write,
+                write,
+                write,
+                write,
+                write,
+                write,
+                write,
+                write,
+                write,
+            ],
+        );
+        let group = bind(
+            gpu,
+            &own_layout,
+            &[
+                &parameters,
+                pixels,
+                &wishes,
+                &templates,
+                &slots,
+                &active,
+                &counts,
+                &digits,
+                &tally,
+                &state,
+                &plans,
+                &listed,
+                &requests,
+                &taken,
+                &free_before,
+            ],
+        );
+        let constants = [("RUN", f64::from(run)), ("LANES", f64::from(lanes))];
+        let mut kernels: Vec<(&str, wgpu::ComputePipeline, Groups)> = Vec::new();
+        for (name, groups) in frame() {
+            let known = kernels.iter().find(|(known, ..)| *known == name);
+            let kernel = match known {
+                Some((_, kernel, _)) => kernel.clone(),
+                None => gpu.compute_pipeline(SOURCE, name, &[&own_layout], &constants),
+            };
+            kernels.push((name, kernel, groups));
+        }
+        let passes = Self {
+            kernels: (kernels.into_iter())
+                .map(|(_, kernel, groups)| (kernel, groups))
+                .collect(),
+            group,
+            parameters,
+            wishes,
+            slots,
+            active,
+            tally,
+            taken,
+            state,
+            readback: gpu.readback("placement", STATE),
+            patches,
+            run,
+            expected: 0,
+        };
+        passes.clear(gpu);
+        Ok(passes)
+    }
+
+    /// Patches of the scene.
+    pub(super) fn patches(&self) -> u32 {
+        self.patches
+    }
+
+    pub(super) fn wishes(&self) -> &wgpu::Buffer {
+        &self.wishes
+    }
+
+    pub(super) fn slots(&self) -> &wgpu::Buffer {
+        &self.slots
+    }
+
+    /// Forgets all slots.
+    pub(super) fn clear(&self, gpu: &Gpu) {
+        let none = vec![NONE; (self.slots.size() / 4) as usize];
+        gpu.queue
+            .write_buffer(&self.slots, 0, bytemuck::cast_slice(&none));
+        let mut state = vec![0_u32; (SnakeState::BYTES / 4) as usize];
+        // Bins lie in no superblock.
+        let places = STATE as usize / 4 + MOST_SUPERBLOCKS * UNIT_WORDS;
+        state[places..].fill(NONE);
+        gpu.queue
+            .write_buffer(&self.state, 0, bytemuck::cast_slice(&state));
+    }
+
+    /// Records the placement of a frame. With `times`, each kernel has a pass of
+    /// its own and writes there when it begins and ends.
+    pub(super) fn record(
+        &self,
+        gpu: &Gpu,
+        encoder: &mut wgpu::CommandEncoder,
+        parameters: &SnakeParameters,
+        times: Option<&wgpu::QuerySet>,
+    ) {
+        gpu.queue
+            .write_buffer(&self.parameters, 0, bytemuck::bytes_of(parameters));
+        encoder.clear_buffer(&self.tally, 0, None);
+        encoder.clear_buffer(&self.taken, 0, None);
+        let begin = |encoder: &mut wgpu::CommandEncoder, timestamp_writes| {
+            let descriptor = wgpu::ComputePassDescriptor {
+                label: Some("snake"),
+                timestamp_writes,
+            };
+            encoder.begin_compute_pass(&descriptor).forget_lifetime()
+        };
+        let Some(query_set) = times else {
+            let mut pass = begin(encoder, None);
+            for kernel in &self.kernels {
+                self.dispatch(&mut pass, kernel);
+            }
+            return;
+        };
+        for (index, kernel) in (0..).step_by(2).zip(&self.kernels) {
+            let timestamps = wgpu::ComputePassTimestampWrites {
+                query_set,
+                beginning_of_pass_write_index: Some(index),
+                end_of_pass_write_index: Some(index + 1),
+            };
+            self.dispatch(&mut begin(encoder, Some(timestamps)), kernel);
+        }
+    }
+
+    fn dispatch(
+        &self,
+        pass: &mut wgpu::ComputePass<'_>,
+        (kernel, groups): &(wgpu::ComputePipeline, Groups),
+    ) {
+        let (x, y) = match groups {
+            Groups::Runs => workgroups(self.patches.div_ceil(self.run), GROUP),
+            Groups::Bins => (BINS.div_ceil(64) as u32, 1),
+            Groups::Digits => (64, 1),
+            Groups::One => (1, 1),
+        };
+        pass.set_bind_group(0, &self.group, &[]);
+        pass.set_pipeline(kernel);
+        pass.dispatch_workgroups(x, y, 1);
+    }
+
+    /// Submits the recorded work and reads what became of it. A copy as long as the
+    /// last list and a little longer mostly has it all, and else the rest is fetched.
+    pub(super) fn submit_and_read(
+        &mut self,
+        gpu: &Gpu,
+        mut encoder: wgpu::CommandEncoder,
+    ) -> Result<(SnakeState, Vec<ActiveTriangle>), GpuError> {
+        let expected = self.expected.min(self.patches);
+        let bytes = STATE + u64::from(expected) * ACTIVE;
+        if self.readback.size() < bytes {
+            self.readback = gpu.readback("placement", bytes + bytes / 2);
+        }
+        encoder.copy_buffer_to_buffer(&self.state, 0, &self.readback, 0, STATE);
+        let list = u64::from(expected) * ACTIVE;
+        encoder.copy_buffer_to_buffer(&self.active, 0, &self.readback, STATE, list);
+        let (state, mut active) = gpu.submit_and_read(encoder, &self.readback, bytes, |bytes| {
+            let (state, list) = bytes.split_at(STATE as usize);
+            let state: SnakeState = bytemuck::pod_read_unaligned(state);
+            let known = state.active_count.min(expected) as usize;
+            let list: Vec<ActiveTriangle> = bytemuck::pod_collect_to_vec(list);
+            (state, list[..known].to_vec())
+        })?;
+        let count = state.active_count.min(self.patches);
+        if count > expected {
+            let rest = u64::from(expected) * ACTIVE..u64::from(count) * ACTIVE;
+            active.extend(gpu.read::<ActiveTriangle>(&self.active, rest)?);
+        }
+        self.expected = count + count / 4 + SPARE;
+        Ok((state, active))
+    }
+}

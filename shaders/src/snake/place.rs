@@ -1,0 +1,486 @@
+//! The twin of all kernels of the snake: one call a frame.
+
+use super::{
+    ActiveTriangle, BIN, BINS, COLLAPSE_SHARE, DEAD_BAND, FORM, FREEZE_FRAMES, MOST_BIAS,
+    MOST_LARGE, NONE, ODD, Place, RAISES, SMALL_CHANGE, SnakeParameters, Superblock, Superblocks,
+    Template, Wish, bin_of,
+    bins::{TURN, is_foreshortened_alike},
+    bits, is_near, least_bias, map_bin,
+    scale::{CELLS, cell},
+    status, templates, with_spare,
+};
+use crate::atlas::importance;
+
+/// A visible triangle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seen {
+    /// Which patch.
+    pub patch: u32,
+    /// That it covers; at least 1.
+    pub pixels: u32,
+    /// What it deserves.
+    pub wish: Wish,
+}
+
+/// What a frame leaves.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Outcome {
+    /// By ascending patch: all that are visible or had a slot.
+    pub active: Vec<ActiveTriangle>,
+    /// Visible triangles.
+    pub visible: u32,
+    /// Subtracted from log2 of all areas, steps.
+    pub bias: i32,
+    /// What of it the empty atlas asked for, beyond what areas told.
+    pub raised: i32,
+    /// See [`status`].
+    pub status: u32,
+    /// Bins that have rows, texels of those, and slots in them.
+    pub reserved: [u32; 3],
+    /// All superblocks, from left to right.
+    pub superblocks: Vec<Superblock>,
+}
+
+/// Who has which slot.
+#[derive(Clone, Debug)]
+pub struct Packer {
+    templates: Vec<Template>,
+    superblocks: Superblocks,
+    places: Vec<Option<Place>>,
+    /// Triangles that have a slot, ascending.
+    residents: Vec<ActiveTriangle>,
+    frozen_for: u32,
+}
+
+/// A triangle of this frame.
+struct Active {
+    record: ActiveTriangle,
+    wish: Wish,
+    /// Shape of the slot that it had.
+    old: u32,
+    /// The bin that it would choose, or has.
+    bin: u32,
+}
+
+impl Active {
+    fn is(&self, bit: u32) -> bool {
+        self.record.bits & bit != 0
+    }
+}
+
+/// What is counted of the triangles of a bin.
+#[derive(Clone, Copy, Default)]
+struct Count {
+    wants: u32,
+    stays: u32,
+    idles: u32,
+    /// Behind the last slot that is in use.
+    end: u32,
+}
+
+/// What becomes of a bin.
+#[derive(Clone, Copy, Default)]
+struct Plan {
+    /// Was given rows in this frame, or has lost them.
+    moved: bool,
+    /// Triangles out of sight give their slots back.
+    evicts: bool,
+}
+
+impl Packer {
+    /// Nothing has a slot yet.
+    #[must_use]
+    pub fn new(parameters: &SnakeParameters) -> Self {
+        Self {
+            templates: templates(),
+            superblocks: Superblocks::new(parameters.sheet()),
+            places: vec![None; BINS],
+            residents: Vec::new(),
+            frozen_for: 0,
+        }
+    }
+
+    /// Gives every visible triangle a slot that suits it, and moves as few as
+    /// possible. `seen` ascends by patch.
+    pub fn place(&mut self, parameters: &SnakeParameters, seen: &[Seen]) -> Outcome {
+        let mut active = self.gather(seen);
+        let mut outcome = Outcome {
+            visible: seen.len() as u32,
+            ..Outcome::default()
+        };
+        let changed = active.iter().filter(|active| {
+            let just_gone = !active.is(bits::SEEN) && active.record.bits >> bits::AGE_SHIFT == 1;
+            just_gone || active.is(bits::SEEN) && !active.is(bits::HAD)
+        });
+        let changed = changed.count() as u32;
+        if outcome.visible > parameters.most_triangles {
+            outcome.status |= status::LEFT_OUT;
+            leave_out(&mut active, parameters.most_triangles);
+        }
+        outcome.bias = self.first_bias(&active, parameters);
+        let is_small = changed.saturating_mul(SMALL_CHANGE) < outcome.visible;
+        if is_small
+            && self.frozen_for < FREEZE_FRAMES
+            && outcome.bias == parameters.bias
+            && parameters.reset == 0
+        {
+            outcome.status |= status::FROZEN;
+            self.frozen_for += 1;
+        } else {
+            self.frozen_for = 0;
+        }
+        let plans = self.make_room(&mut active, parameters, &mut outcome);
+        self.assign(&mut active, &plans, parameters);
+
+        self.residents = active.iter().map(|active| active.record).collect();
+        self.residents.retain(|record| record.shape != NONE);
+        outcome.active = active.into_iter().map(|active| active.record).collect();
+        for place in self.places.iter().flatten() {
+            let width = self.superblocks.blocks()[place.superblock as usize].width;
+            outcome.reserved[0] += 1;
+            outcome.reserved[1] += place.units * parameters.unit * width;
+            outcome.reserved[2] += place.capacity;
+        }
+        outcome.superblocks = self.superblocks.blocks().to_vec();
+        outcome
+    }
+
+    /// Where a bin lies.
+    #[must_use]
+    pub fn bin_place(&self, bin: u32) -> Option<Place> {
+        self.places[bin as usize]
+    }
+
+    /// The visible triangles and those that have a slot, by ascending patch.
+    fn gather(&self, seen: &[Seen]) -> Vec<Active> {
+        let mut active = Vec::with_capacity(seen.len().max(self.residents.len()));
+        let mut residents = self.residents.iter().peekable();
+        let of = |seen: Option<&Seen>, resident: Option<&ActiveTriangle>| {
+            let (mut record, mut wish) = (ActiveTriangle::default(), Wish::default());
+            let mut old = NONE;
+            (record.shape, record.at) = (NONE, NONE);
+            if let Some(resident) = resident {
+                (record.patch_id, record.index) = (resident.patch_id, resident.index);
+                old = resident.shape & !ODD;
+                let age = ((resident.bits >> bits::AGE_SHIFT) + 1).min(255);
+                record.bits = bits::HAD | age << bits::AGE_SHIFT;
+            }
+            if let Some(seen) = seen {
+                (record.patch_id, record.pixels, wish) = (seen.patch, seen.pixels, seen.wish);
+                record.bits = record.bits & bits::HAD | bits::SEEN;
+            }
+            Active {
+                record,
+                wish,
+                old,
+                bin: 0,
+            }
+        };
+        for seen in seen {
+            while let Some(resident) = residents.next_if(|r| r.patch_id < seen.patch) {
+                active.push(of(None, Some(resident)));
+            }
+            let resident = residents.next_if(|r| r.patch_id == seen.patch);
+            active.push(of(Some(seen), resident));
+        }
+        active.extend(residents.map(|resident| of(None, Some(resident))));
+        active
+    }
+
+    /// The least bias, or what was, where that is only a little more.
+    fn first_bias(&self, active: &[Active], parameters: &SnakeParameters) -> i32 {
+        let mut counts = [0; CELLS];
+        for active in active.iter().filter(|active| active.is(bits::SEEN)) {
+            counts[cell(active.wish)] += 1;
+        }
+        let (largest, budget) = (parameters.largest, parameters.budget);
+        let needed = least_bias(&self.templates, &counts, largest, budget);
+        if (parameters.bias - DEAD_BAND..=parameters.bias).contains(&needed) {
+            parameters.bias
+        } else {
+            needed
+        }
+    }
+
+    /// Lets triangles choose bins and gives bins rows, where need be in an empty
+    /// atlas, and where need be smaller.
+    fn make_room(
+        &mut self,
+        active: &mut [Active],
+        parameters: &SnakeParameters,
+        outcome: &mut Outcome,
+    ) -> Vec<Plan> {
+        self.superblocks.begin();
+        if parameters.reset == 0 {
+            let counts = self.request(active, parameters, outcome, false);
+            if let Ok(plans) = self.lay_bins(&counts, outcome.status & status::FROZEN != 0) {
+                return plans;
+            }
+            outcome.status |= status::FULL;
+        }
+        outcome.status = outcome.status & !status::FROZEN | status::RESET;
+        self.frozen_for = 0;
+        let mut raises = RAISES.iter();
+        loop {
+            self.superblocks.clear();
+            self.places.fill(None);
+            let counts = self.request(active, parameters, outcome, true);
+            let raise = match (self.lay_bins(&counts, false), raises.next()) {
+                (Ok(plans), _) | (Err(plans), None) => return plans,
+                (Err(_), Some(raise)) => raise,
+            };
+            let before = outcome.bias;
+            outcome.status |= status::RAISED;
+            outcome.bias = (outcome.bias + raise).min(MOST_BIAS);
+            outcome.raised += outcome.bias - before;
+        }
+    }
+
+    /// Each triangle chooses a bin, and says whether it keeps its slot.
+    fn request(
+        &self,
+        active: &mut [Active],
+        parameters: &SnakeParameters,
+        outcome: &Outcome,
+        anew: bool,
+    ) -> Vec<Count> {
+        let frozen = !anew && outcome.status & status::FROZEN != 0;
+        let (bias, largest) = (outcome.bias, parameters.largest);
+        let mut demand = vec![0_u32; BINS];
+        for active in active.iter_mut() {
+            active.record.bits &= !(bits::KEPT | bits::WANTED | bits::CHANGED | bits::IDLE);
+            if !active.is(bits::SEEN) {
+                continue;
+            }
+            let old_bin = active.old & BIN;
+            let has_slot = !anew && active.is(bits::HAD);
+            let stays = has_slot
+                && (frozen
+                    || (active.old ^ active.wish.form()) & TURN == 0
+                        && is_near(&self.templates, old_bin, active.wish, bias, largest));
+            active.bin = if stays {
+                active.record.bits |= bits::KEPT;
+                old_bin
+            } else {
+                bin_of(&self.templates, active.wish, bias, largest)
+            };
+            demand[active.bin as usize] += 1;
+        }
+        let is_sink = |bin: u32| {
+            let row = self.templates[bin as usize].in_row(parameters.least_width);
+            self.places[bin as usize].is_some() || demand[bin as usize] > row
+        };
+        let mapping: Vec<u32> = (0..BINS as u32)
+            .map(|bin| match demand[bin as usize] {
+                0 => bin,
+                _ => map_bin(&self.templates, bin, largest, is_sink),
+            })
+            .collect();
+        let mut counts = vec![Count::default(); BINS];
+        for active in active.iter_mut() {
+            choose_target(active, &mapping, &mut counts, parameters, frozen, anew);
+        }
+        counts
+    }
+
+    /// Algorithm 2. With bins that found no room, the plans are an error.
+    fn lay_bins(&mut self, counts: &[Count], frozen: bool) -> Result<Vec<Plan>, Vec<Plan>> {
+        let mut plans = vec![Plan::default(); BINS];
+        for bin in (0..BINS).rev() {
+            let (template, count) = (&self.templates[bin], counts[bin]);
+            let Some(place) = &mut self.places[bin] else {
+                continue;
+            };
+            let need = count.stays + count.wants;
+            plans[bin].evicts = need + count.idles > place.capacity;
+            let live = if plans[bin].evicts {
+                need
+            } else {
+                need + count.idles
+            };
+            let mut gone = live == 0
+                || need > place.capacity
+                    && !self.superblocks.grow(template, place, with_spare(need));
+            if !gone && !frozen && live * 2 < place.capacity {
+                let least = with_spare(live);
+                if count.end <= least {
+                    self.superblocks.shrink(template, place, least);
+                } else {
+                    gone = self.superblocks.is_sparse(template, place, least);
+                }
+            }
+            if gone {
+                self.superblocks.release(*place);
+                self.places[bin] = None;
+                plans[bin].moved = true;
+            }
+        }
+        if !frozen {
+            self.collapse(&mut plans);
+        }
+        self.superblocks.drop_last();
+        let mut is_full = false;
+        for (bin, triangles) in self.homeless(counts) {
+            self.places[bin] = self.superblocks.place(&self.templates[bin], triangles);
+            plans[bin].moved = true;
+            is_full |= self.places[bin].is_none();
+        }
+        if is_full { Err(plans) } else { Ok(plans) }
+    }
+
+    /// Bins that ask for rows, and for how many triangles, in their order.
+    fn homeless(&self, counts: &[Count]) -> Vec<(usize, u32)> {
+        let need = |bin: usize| with_spare(counts[bin].stays + counts[bin].wants);
+        let asks = |bin: &usize| self.places[*bin].is_none() && need(*bin) > 0;
+        let area = |bin: usize| self.superblocks.area(&self.templates[bin], need(bin));
+        let (mut large, small): (Vec<usize>, Vec<usize>) =
+            ((0..BINS).rev().filter(asks)).partition(|&bin| self.superblocks.is_large(area(bin)));
+        if large.len() <= MOST_LARGE {
+            large.sort_by_key(|&bin| std::cmp::Reverse(area(bin)));
+        }
+        let all = large.into_iter().chain(small);
+        all.map(|bin| (bin, need(bin))).collect()
+    }
+
+    /// Empties superblocks that have become nearly empty.
+    fn collapse(&mut self, plans: &mut [Plan]) {
+        let units = self.superblocks.sheet().units;
+        let mut collapses = Vec::new();
+        for block in self.superblocks.blocks_mut() {
+            let falls =
+                block.used * COLLAPSE_SHARE < units && block.peak * COLLAPSE_SHARE >= 2 * units;
+            collapses.push(falls);
+        }
+        for (place, plan) in self.places.iter_mut().zip(plans) {
+            if let Some(gone) = place.take_if(|place| collapses[place.superblock as usize]) {
+                self.superblocks.release(gone);
+                plan.moved = true;
+            }
+        }
+        for (block, falls) in self.superblocks.blocks_mut().iter_mut().zip(collapses) {
+            if falls {
+                block.peak = 0;
+            }
+        }
+    }
+
+    /// Each triangle that wants a slot gets the next free one of its bin.
+    fn assign(&mut self, active: &mut [Active], plans: &[Plan], parameters: &SnakeParameters) {
+        let slots = |bin: usize| self.places[bin].map_or(0, |place| place.capacity as usize);
+        let mut taken: Vec<Vec<bool>> = (0..BINS).map(|bin| vec![false; slots(bin)]).collect();
+        for active in active.iter_mut() {
+            let plan = plans[active.bin as usize];
+            let record = &mut active.record;
+            let is_idle = record.bits & bits::IDLE != 0;
+            if record.bits & bits::KEPT != 0 && plan.moved {
+                record.bits = record.bits & !bits::KEPT | bits::WANTED | bits::CHANGED;
+            } else if is_idle && (plan.moved || plan.evicts) {
+                record.shape = NONE;
+            } else if is_idle || record.bits & bits::KEPT != 0 {
+                taken[active.bin as usize][record.index as usize] = true;
+                self.set_slot(record, active.bin, parameters);
+            }
+        }
+        let mut next = vec![0_usize; BINS];
+        for active in active.iter_mut().filter(|active| active.is(bits::WANTED)) {
+            let bin = active.bin as usize;
+            let free = taken[bin].iter().skip(next[bin]).position(|taken| !taken);
+            let Some(free) = free else {
+                active.record.shape = NONE;
+                active.record.bits &= !bits::CHANGED;
+                continue;
+            };
+            active.record.index = (next[bin] + free) as u32;
+            next[bin] += free + 1;
+            self.set_slot(&mut active.record, active.bin, parameters);
+        }
+    }
+
+    /// Tells where a slot lies.
+    fn set_slot(&self, record: &mut ActiveTriangle, bin: u32, parameters: &SnakeParameters) {
+        let Some(place) = self.places[bin as usize] else {
+            return;
+        };
+        let template = &self.templates[bin as usize];
+        let block = self.superblocks.blocks()[place.superblock as usize];
+        let per = template.in_row(block.width);
+        let (row, column) = (record.index / per, record.index % per);
+        let is_odd = column % 2 == 1;
+        let pair = template.to_odd + template.to_even;
+        let x = block.x + column / 2 * pair + if is_odd { template.to_odd } else { 0 };
+        let y = place.first * parameters.unit + row * (template.height + 1);
+        record.at = x | y << 16;
+        record.shape = record.shape & !ODD | if is_odd { ODD } else { 0 };
+    }
+}
+
+/// Takes out all but the `most` most important visible triangles, as though they
+/// had just gone out of sight.
+fn leave_out(active: &mut [Active], most: u32) {
+    let mut classes = [0_u32; 256];
+    for active in active.iter().filter(|active| active.is(bits::SEEN)) {
+        classes[importance(active.record.pixels) as usize] += 1;
+    }
+    let (mut class, mut left) = (255, most);
+    while class > 0 && classes[class] <= left {
+        left -= classes[class];
+        class -= 1;
+    }
+    for active in active.iter_mut().filter(|active| active.is(bits::SEEN)) {
+        let own = importance(active.record.pixels) as usize;
+        if own < class || own == class && left == 0 {
+            active.record.bits ^= bits::SEEN | bits::LEFT_OUT;
+            active.record.bits |= 1 << bits::AGE_SHIFT;
+        } else if own == class {
+            left -= 1;
+        }
+    }
+}
+
+/// Where a triangle goes once bins are mapped; counts it there.
+fn choose_target(
+    active: &mut Active,
+    mapping: &[u32],
+    counts: &mut [Count],
+    parameters: &SnakeParameters,
+    frozen: bool,
+    anew: bool,
+) {
+    let has_slot = !anew && active.is(bits::HAD);
+    let old_bin = active.old & BIN;
+    let record = &mut active.record;
+    record.shape = NONE;
+    if record.bits & bits::SEEN == 0 {
+        let age = record.bits >> bits::AGE_SHIFT;
+        if has_slot && age < parameters.keep_unseen {
+            record.bits |= bits::IDLE;
+            record.shape = active.old;
+            active.bin = old_bin;
+            let count = &mut counts[old_bin as usize];
+            count.idles += 1;
+            count.end = count.end.max(record.index + 1);
+        }
+        return;
+    }
+    if record.bits & bits::KEPT == 0 {
+        active.bin = mapping[active.bin as usize];
+    }
+    let form = active.wish.form();
+    record.shape = active.bin | form;
+    let count = &mut counts[active.bin as usize];
+    if has_slot && active.bin == old_bin {
+        let alike = (active.old ^ form) & TURN == 0 && is_foreshortened_alike(active.old, form);
+        record.bits |= bits::KEPT;
+        if frozen || alike {
+            record.shape = active.old;
+        } else {
+            record.bits |= bits::CHANGED;
+        }
+        count.stays += 1;
+        count.end = count.end.max(record.index + 1);
+    } else {
+        record.bits |= bits::WANTED | bits::CHANGED;
+        count.wants += 1;
+    }
+    debug_assert!(record.shape & FORM == record.shape & !BIN);
+}
