@@ -1,0 +1,332 @@
+//! Where the head will be while an update is on display, and from where patches
+//! are looked for to cover it.
+//!
+//! An update made now is first seen one latency later, and then until the next one
+//! takes its place. [`Horizon`] is that time, as measured; heads are predicted at
+//! steps of it ([`HeadFilter`]), and each is seen from by both eyes. What prediction
+//! may miss is covered twice: turning by an enlarged image plane, moving by
+//! viewpoints at the corners of a square about the last head. Both grow with what
+//! the filter doubts, and so with the interval.
+//!
+//! Sources: Mueller et al., "Shading Atlas Streaming", 2018, section 3.1 and figure
+//! 5; Kravec, "Realistic Remote Rendering for VR and Mobile Devices", 2023,
+//! section 4.1.1 and algorithm 1. We depart from SAS in that heads are sampled over
+//! the time on display rather than from now on: what is seen until then was in
+//! updates before, whose patches the atlas keeps for a while. And the image plane is
+//! as large as the prediction is doubtful, not always 1.2 times as wide.
+
+mod horizon;
+mod kalman;
+
+use std::time::Duration;
+
+use glam::{Mat4, Vec3, vec3};
+use shadecast_protocol::{EyeView, Fov, Motion, Pose, ViewReport};
+
+pub use horizon::{Horizon, Latency};
+pub use kalman::{Doubt, HeadFilter};
+
+/// Nearest thing that is drawn, metres: nearer than a face lets things come.
+const NEAR: f32 = 0.02;
+/// Largest factor by which an image plane grows: beyond it most of the pictures would
+/// be margin.
+const MOST_ENLARGED: f32 = 1.5;
+
+/// A head that may be, some time from now.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PredictedHead {
+    /// From the beginning of the frame.
+    pub after: Duration,
+    /// Where it is expected.
+    pub world_from_head: Pose,
+    /// How far it may be from there.
+    pub doubt: Doubt,
+}
+
+/// Where the head may be while an update is on display.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Prediction {
+    /// At ascending times; at least one.
+    pub heads: Vec<PredictedHead>,
+    /// The report that they come from.
+    pub view: ViewReport,
+}
+
+impl Prediction {
+    /// `samples` heads, evenly over `horizon` from the report on, by linear
+    /// extrapolation of its velocities, and without any doubt.
+    #[must_use]
+    pub fn linear(view: &ViewReport, horizon: Duration, samples: u32) -> Self {
+        let horizon = Horizon {
+            shown: Duration::ZERO,
+            gone: horizon,
+        };
+        let motion = Motion {
+            pose: view.world_from_head,
+            linear_velocity: view.linear_velocity,
+            angular_velocity: view.angular_velocity,
+        };
+        let head = |after: Duration| PredictedHead {
+            after,
+            world_from_head: motion.after(after.as_secs_f32()),
+            doubt: Doubt::NONE,
+        };
+        Self {
+            heads: horizon.samples(samples).map(head).collect(),
+            view: *view,
+        }
+    }
+
+    /// At most `most` heads over `horizon`, which begins `age` after `view`, the
+    /// newest report that `filter` was told of.
+    #[must_use]
+    pub fn filtered(
+        view: &ViewReport,
+        filter: &HeadFilter,
+        age: Duration,
+        horizon: Horizon,
+        most: u32,
+    ) -> Self {
+        let head = |after: Duration| {
+            let (world_from_head, doubt) = filter.after(after + age);
+            PredictedHead {
+                after,
+                world_from_head,
+                doubt,
+            }
+        };
+        Self {
+            heads: horizon.samples(horizon.steps(most)).map(head).collect(),
+            view: *view,
+        }
+    }
+
+    /// The head in the middle of the horizon.
+    #[must_use]
+    pub fn middle(&self) -> Pose {
+        let last = self.heads.len() - 1;
+        let (a, b) = (
+            self.heads[last / 2].world_from_head,
+            self.heads[last.div_ceil(2)].world_from_head,
+        );
+        Pose {
+            position: a.position.lerp(b.position, 0.5),
+            orientation: a.orientation.slerp(b.orientation, 0.5),
+        }
+    }
+
+    /// The eye between both eyes, from which patches are measured and glossy
+    /// texels are lit.
+    #[must_use]
+    pub fn eye(&self) -> Vec3 {
+        let head = self.middle();
+        let eyes = (self.view.eyes).map(|eye| head.then(eye.head_from_eye).position);
+        (eyes[0] + eyes[1]) * 0.5
+    }
+
+    /// Pixels per radian in the middle of the left eye's picture.
+    #[must_use]
+    pub fn pixels_per_radian(&self) -> f32 {
+        let fov = self.view.eyes[0].fov;
+        f32::from(self.view.eye_resolution[0]) / (fov.right - fov.left)
+    }
+
+    /// From where patches are looked for: both eyes of every head, and the corners in
+    /// place of those of the last.
+    #[must_use]
+    pub fn viewpoints(&self) -> Vec<Viewpoint> {
+        let (last, others) = self.heads.split_last().expect("there is at least one head");
+        let seen_from = |head: &PredictedHead, eyes: &[EyeView]| -> Vec<Viewpoint> {
+            let viewpoint = |eye: &EyeView| {
+                let enlargement = enlargement(eye.fov, head.doubt.radians);
+                Viewpoint::new(
+                    head.after,
+                    head.world_from_head,
+                    *eye,
+                    &self.view,
+                    enlargement,
+                )
+            };
+            eyes.iter().map(viewpoint).collect()
+        };
+        let mut viewpoints: Vec<Viewpoint> = (others.iter())
+            .flat_map(|head| seen_from(head, &self.view.eyes))
+            .collect();
+        if last.doubt.metres > 0.0 {
+            let corners = corners(self.view.eyes, last.doubt.metres);
+            viewpoints.extend(seen_from(last, &corners));
+        } else {
+            viewpoints.extend(seen_from(last, &self.view.eyes));
+        }
+        viewpoints
+    }
+}
+
+/// Two eyes moved apart, up and down by `aside`: they stand at the corners of a
+/// rectangle that every head so far aside has its eyes in. Source: Kravec 2023,
+/// algorithm 1, whose one camera has the corners beside it.
+#[must_use]
+pub fn corners(eyes: [EyeView; 2], aside: f32) -> [EyeView; 4] {
+    let [left, right] = eyes;
+    let moved = |eye: EyeView, x: f32, y: f32| EyeView {
+        head_from_eye: Pose {
+            position: eye.head_from_eye.position + vec3(x, y, 0.0) * aside,
+            ..eye.head_from_eye
+        },
+        ..eye
+    };
+    [
+        moved(left, -1.0, 1.0),
+        moved(right, 1.0, 1.0),
+        moved(left, -1.0, -1.0),
+        moved(right, 1.0, -1.0),
+    ]
+}
+
+/// The factor of an image plane that shows `margin` radians more on its widest side.
+#[must_use]
+pub fn enlargement(fov: Fov, margin: f32) -> f32 {
+    let sides = [fov.left, fov.right, fov.up, fov.down];
+    let widest = sides
+        .into_iter()
+        .fold(0.0, |widest: f32, side| widest.max(side.abs()));
+    let beyond = (widest + margin).min(89.5_f32.to_radians());
+    let factor = beyond.tan() / widest.tan();
+    // False for NaN, which no valid field of view gives.
+    if factor > 1.0 {
+        factor.min(MOST_ENLARGED)
+    } else {
+        1.0
+    }
+}
+
+/// A picture of patch ids that is to be drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Viewpoint {
+    /// From the beginning of the frame; objects are where they are then.
+    pub after: Duration,
+    /// The eye.
+    pub world_from_eye: Pose,
+    /// What the picture shows.
+    pub fov: Fov,
+    /// Its width and height, pixels.
+    pub size: [u32; 2],
+}
+
+impl Viewpoint {
+    /// Largest side of an id picture; beyond it pixels grow instead.
+    pub const LARGEST_SIDE: u32 = 4096;
+    /// Smallest side.
+    const SMALLEST_SIDE: u32 = 16;
+
+    /// What `eye` of a head sees on an image plane `enlargement` times as wide and
+    /// high as the eye's own, with pixels as large as those of `view` (SAS 2018,
+    /// section 3.1).
+    #[must_use]
+    pub fn new(
+        after: Duration,
+        world_from_head: Pose,
+        eye: EyeView,
+        view: &ViewReport,
+        enlargement: f32,
+    ) -> Self {
+        let side = |side: u16| {
+            let pixels = (f32::from(side) * enlargement).round() as u32;
+            pixels.clamp(Self::SMALLEST_SIDE, Self::LARGEST_SIDE)
+        };
+        Self {
+            after,
+            world_from_eye: world_from_head.then(eye.head_from_eye),
+            fov: eye.fov.enlarged(enlargement),
+            size: view.eye_resolution.map(side),
+        }
+    }
+
+    /// From the world into clip space.
+    #[must_use]
+    pub fn clip_from_world(&self) -> Mat4 {
+        self.fov.projection(NEAR) * self.world_from_eye.inverse().matrix()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Quat;
+    use shadecast_protocol::{ClientTime, ViewSeq};
+
+    use super::*;
+
+    fn view(fov: Fov) -> ViewReport {
+        ViewReport {
+            seq: ViewSeq(0),
+            sampled_at: ClientTime(0),
+            display_at: ClientTime(0),
+            world_from_head: Pose::IDENTITY,
+            linear_velocity: Vec3::X,
+            angular_velocity: Vec3::Y,
+            eyes: [-0.03, 0.03].map(|x| EyeView {
+                head_from_eye: Pose {
+                    position: Vec3::X * x,
+                    orientation: Quat::IDENTITY,
+                },
+                fov,
+            }),
+            eye_resolution: [100, 80],
+            hands: [None; 2],
+        }
+    }
+
+    #[test]
+    fn both_eyes_of_every_head_are_seen_from_and_corners_of_the_last() {
+        let view = view(Fov::symmetric(1.5));
+        let mut prediction = Prediction::linear(&view, Duration::from_millis(100), 3);
+        assert_eq!(prediction.viewpoints().len(), 3 * 2, "there is no doubt");
+        let xs = |prediction: &Prediction| -> Vec<f32> {
+            let viewpoints = prediction.viewpoints();
+            viewpoints
+                .iter()
+                .map(|v| v.world_from_eye.position.x)
+                .collect()
+        };
+        for (found, expected) in xs(&prediction).into_iter().zip([-0.03, 0.03, 0.02, 0.08]) {
+            assert!((found - expected).abs() < 3e-3, "{found} {expected}");
+        }
+        prediction.heads.truncate(1);
+        prediction.heads[0].doubt.metres = 0.01;
+        assert_eq!(prediction.viewpoints().len(), 4);
+        for (found, expected) in xs(&prediction).into_iter().zip([-0.04, 0.04, -0.04, 0.04]) {
+            assert!((found - expected).abs() < 1e-6);
+        }
+        let last = prediction.viewpoints()[3];
+        assert!((last.world_from_eye.position.y + 0.01).abs() < 1e-6);
+    }
+
+    #[test]
+    fn pictures_grow_with_doubt_and_keep_the_size_of_their_pixels() {
+        let view = view(Fov::symmetric(1.5));
+        let wide = |fov, radians| enlargement(fov, radians);
+        assert_eq!(wide(view.eyes[0].fov, 0.0), 1.0);
+        let factor = wide(view.eyes[0].fov, 0.05);
+        assert!((factor - (0.8_f32.tan() / 0.75_f32.tan())).abs() < 1e-4);
+        let viewpoint = |factor| {
+            let head = Pose::IDENTITY;
+            Viewpoint::new(Duration::ZERO, head, view.eyes[0], &view, factor)
+        };
+        assert_eq!(viewpoint(1.2).size, [120, 96]);
+        assert_eq!(viewpoint(1.0).fov, view.eyes[0].fov);
+    }
+
+    #[test]
+    fn the_narrowest_and_the_widest_eyes_stay_possible() {
+        for degrees in [1.0_f32, 170.0, 178.0] {
+            for doubt in [0.0, 0.1, 3.0, f32::INFINITY, f32::NAN] {
+                let view = view(Fov::symmetric(degrees.to_radians()));
+                let factor = enlargement(view.eyes[0].fov, doubt);
+                assert!((1.0..=MOST_ENLARGED).contains(&factor), "{degrees} {doubt}");
+                let head = Pose::IDENTITY;
+                let seen = Viewpoint::new(Duration::ZERO, head, view.eyes[0], &view, factor);
+                assert!(seen.fov.right > seen.fov.left && seen.clip_from_world().is_finite());
+            }
+        }
+    }
+}
