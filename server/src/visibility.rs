@@ -22,8 +22,11 @@ use crate::{
     prediction::Viewpoint,
 };
 
-/// Most pictures of a frame: two eyes of seven heads, and the corners of the last.
-const MOST_PICTURES: usize = 2 * 7 + 4;
+/// Most pictures of a frame: two of each of eight heads.
+const MOST_PICTURES: usize = 2 * 8;
+/// Sides of the target are rounded up to these, pixels: pictures that are a little
+/// larger than the last ones need no new one.
+const TARGET_STEP: u32 = 64;
 
 /// The pass that finds the potentially visible set.
 #[derive(Debug)]
@@ -157,7 +160,7 @@ impl Visibility {
         &self.counts
     }
 
-    /// Records the finding of what is seen from any of the first 18 `viewpoints`.
+    /// Records the finding of what is seen from any of the first 16 `viewpoints`.
     ///
     /// `objects_after` tells `world_from_object` of all objects, `ObjectId(1)` first,
     /// so long after the beginning of the frame.
@@ -175,7 +178,8 @@ impl Visibility {
         let Some(size) = largest.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else {
             return;
         };
-        self.ensure_target(gpu, (size[0], size[1]));
+        let [width, height] = size.map(|side| side.next_multiple_of(TARGET_STEP));
+        self.ensure_target(gpu, (width, height));
         let Some(target) = &self.target else {
             return;
         };
@@ -247,11 +251,7 @@ impl Visibility {
     }
 
     fn ensure_target(&mut self, gpu: &Gpu, size: (u32, u32)) {
-        if self
-            .target
-            .as_ref()
-            .is_some_and(|target| target.size == size)
-        {
+        if (self.target.as_ref()).is_some_and(|target| target.size == size) {
             return;
         }
         let texture = |format, usage| {

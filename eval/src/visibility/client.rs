@@ -71,6 +71,9 @@ enum Corners {
     Beside(f32),
     /// In place of its eyes.
     Instead(f32),
+    /// Two at either end of a diagonal in place of each head's eyes, on the other
+    /// diagonal for every second head.
+    Shared(f32),
 }
 
 const fn policy(
@@ -95,7 +98,7 @@ pub(super) const SERVED: Policy = policy(
     Predictor::Kalman,
     Heads::OnDisplay(2),
     Margin::Doubt(1.0),
-    Corners::Instead(1.0),
+    Corners::Shared(1.0),
 );
 
 /// What is compared at every gait: the same with other predictors.
@@ -127,7 +130,7 @@ pub(super) const PREDICTORS: [Policy; 4] = [
 ];
 
 /// The choices of the server one by one.
-pub(super) const CHOICES: [Policy; 9] = [
+pub(super) const CHOICES: [Policy; 10] = [
     Policy {
         name: "from the report on",
         heads: Heads::FromReport,
@@ -154,8 +157,13 @@ pub(super) const CHOICES: [Policy; 9] = [
         ..SERVED
     },
     Policy {
+        name: "corners in place of the last eyes",
+        corners: Corners::Instead(1.0),
+        ..SERVED
+    },
+    Policy {
         name: "corners twice as far",
-        corners: Corners::Instead(2.0),
+        corners: Corners::Shared(2.0),
         ..SERVED
     },
     Policy {
@@ -218,6 +226,14 @@ impl Policy {
                     aside(factor).into_iter().chain(eyes).collect()
                 }
                 Corners::Instead(factor) if index == last => aside(factor).into(),
+                Corners::Shared(factor) => {
+                    let [a, b, c, d] = aside(factor);
+                    if index % 2 == 0 {
+                        vec![a, d]
+                    } else {
+                        vec![c, b]
+                    }
+                }
                 _ => eyes.into(),
             };
             viewpoints.extend(eyes.into_iter().map(|eye| {

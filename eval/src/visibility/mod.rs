@@ -29,8 +29,10 @@ use crate::{
     scenes,
 };
 
-/// Latencies of clients, in pictures of 11 ms: 33, 67, 100 and 200 ms.
-const LATENCIES: [u32; 4] = [3, 6, 9, 18];
+/// Latencies of clients, in pictures of 11 ms: 33, 100 and 200 ms.
+const LATENCIES: [u32; 3] = [3, 9, 18];
+/// Those at which the server's choices are compared.
+const CHOSEN_AT: [u32; 2] = [3, 9];
 /// Triangles of the courtyard whose triangles are mostly smaller than pixels.
 const FINE: usize = 250_000;
 
@@ -46,6 +48,9 @@ pub struct Options {
     /// A rough run of less than three minutes: one scene, fewer moments, smaller pictures.
     #[arg(long)]
     pub quick: bool,
+    /// Pixels of an eye's picture, each way [default: 512, quick: 256].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(64..=2048))]
+    pub side: Option<u16>,
     /// Seed of the heads' paths.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u32,
@@ -60,27 +65,28 @@ struct Extent {
     drawn_seconds: f64,
     /// At which sets are compared.
     moments: u32,
+    /// At which every predictor is compared.
     latencies: &'static [u32],
     gaits: &'static [Gait],
 }
 
 impl Extent {
-    fn of(quick: bool) -> Self {
-        if quick {
+    fn of(options: &Options) -> Self {
+        if options.quick {
             Self {
-                side: 256,
+                side: options.side.unwrap_or(256),
                 predicted_seconds: 20.0,
                 drawn_seconds: 4.0,
                 moments: 12,
-                latencies: &[3, 9],
+                latencies: &CHOSEN_AT,
                 gaits: &[WALK],
             }
         } else {
             Self {
-                side: 512,
+                side: options.side.unwrap_or(512),
                 predicted_seconds: 60.0,
-                drawn_seconds: 10.0,
-                moments: 40,
+                drawn_seconds: 4.0,
+                moments: 24,
                 latencies: &LATENCIES,
                 gaits: &GAITS,
             }
@@ -106,8 +112,8 @@ pub fn run(options: &Options) -> Result<String> {
         ([], false) => ["courtyard", "courtyard-fine"].map(String::from).into(),
         (given, _) => given.to_vec(),
     };
-    let extent = Extent::of(options.quick);
-    let steps = names.len() * extent.gaits.len() * 3;
+    let extent = Extent::of(options);
+    let steps = (extent.gaits.len() + names.len() - 1) * 3;
     let progress = Progress::new(steps as u64);
     let mut found = Found::default();
     let mut driver = String::new();
@@ -120,11 +126,20 @@ pub fn run(options: &Options) -> Result<String> {
         let side = f32::from(extent.side);
         let mut seer = Seer::new(&scene, side / std::f32::consts::FRAC_PI_2)?;
         seer.gpu.adapter.clone_into(&mut driver);
-        // Other scenes need not be walked through in every way.
-        let gaits = if index == 0 { extent.gaits } else { &[WALK] };
-        for gait in gaits {
+        // Further scenes need not be walked through in every way.
+        let extent = if index == 0 {
+            &extent
+        } else {
+            &Extent {
+                moments: extent.moments / 4,
+                latencies: &CHOSEN_AT,
+                gaits: &[WALK],
+                ..extent
+            }
+        };
+        for gait in extent.gaits {
             let case = (name.as_str(), &scene, *gait, options.seed.into());
-            measure(&mut seer, case, &extent, &mut found, &progress)?;
+            measure(&mut seer, case, extent, index == 0, &mut found, &progress)?;
         }
     }
     progress.finish();
@@ -143,6 +158,7 @@ fn measure(
     seer: &mut Seer,
     (name, scene, gait, seed): (&str, &Scene, Gait, u64),
     extent: &Extent,
+    is_first: bool,
     found: &mut Found,
     progress: &Progress,
 ) -> Result<()> {
@@ -163,26 +179,22 @@ fn measure(
     let truth = Truth::of(seer, &head, side, ticks, within)?;
 
     progress.step(&format!("{name}, {}: what is missing", gait.name));
-    let choices: &[Policy] = if gait.name == WALK.name {
-        &CHOICES
-    } else {
-        &[]
-    };
-    let policies: Vec<&Policy> = (PREDICTORS.iter())
-        .chain(std::iter::once(&SERVED))
-        .chain(choices)
+    // The server's choices one by one where it is walked as in the targets, and where
+    // most is asked of them.
+    let last = GAITS[GAITS.len() - 1].name;
+    let choices = is_first && [WALK.name, last].contains(&gait.name);
+    let predictors = PREDICTORS.iter().filter(|_| is_first).chain([&SERVED]);
+    let compared = predictors.map(|policy| (policy, extent.latencies));
+    let chosen = CHOICES.iter().filter(|_| choices);
+    let cases: Vec<(&Policy, u32)> = compared
+        .chain(chosen.map(|policy| (policy, &CHOSEN_AT[..])))
+        .flat_map(|(policy, latencies)| latencies.iter().map(move |latency| (policy, *latency)))
         .collect();
-    let cases = policies.len() * extent.latencies.len();
-    let mut done = 0;
-    for latency in extent.latencies {
-        for policy in &policies {
-            within(done as f32 / cases as f32);
-            done += 1;
-            let walk = (&head, gait);
-            found.missing.push(client::measure(
-                seer, name, walk, &truth, side, **policy, *latency,
-            )?);
-        }
+    for (done, (policy, latency)) in cases.iter().enumerate() {
+        within(done as f32 / cases.len() as f32);
+        let walk = (&head, gait);
+        let row = client::measure(seer, name, walk, &truth, side, **policy, *latency)?;
+        found.missing.push(row);
     }
     Ok(())
 }

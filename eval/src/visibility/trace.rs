@@ -30,6 +30,9 @@ const ANGULAR_VELOCITY_NOISE: f64 = 1e-2;
 const PACE_PERIOD: f64 = 7.3;
 const PACE_CHANGE: f64 = 0.35;
 
+/// The first gaze, yaw and pitch in radians.
+const AHEAD: [f64; 2] = [0.0, -0.05];
+
 /// How someone moves.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gait {
@@ -137,7 +140,7 @@ impl Head {
     fn gaze(&self, seconds: f64) -> [f64; 2] {
         let next = self.gazes.partition_point(|gaze| gaze.begins <= seconds);
         let Some(gaze) = next.checked_sub(1).map(|index| self.gazes[index]) else {
-            return [0.0; 2];
+            return AHEAD;
         };
         let s = ((seconds - gaze.begins) / gaze.takes).clamp(0.0, 1.0);
         let share = s.powi(3) * (10.0 + s * (6.0 * s - 15.0));
@@ -189,7 +192,7 @@ fn gazes(gait: Gait, seed: u64, seconds: f64) -> Vec<Gaze> {
     /// The fastest of a path of least jerk, over its mean speed.
     const PEAK: f64 = 1.875;
     let mut gazes: Vec<Gaze> = Vec::new();
-    let (mut begins, mut from) = (0.4, [0.0, -0.05]);
+    let (mut begins, mut from) = (0.4, AHEAD);
     for index in 0_u64.. {
         if begins > seconds {
             break;
@@ -256,6 +259,33 @@ mod tests {
                 "{walked} m"
             );
             assert!((1.0..5.0).contains(&fastest_turn), "{fastest_turn} rad/s");
+        }
+    }
+
+    #[test]
+    fn nobody_walks_through_walls() {
+        let scene = courtyard(10_000);
+        let head = Head::new(&scene, WALK, 1, 20.0);
+        for tick in (0..15 * RATE).step_by(15) {
+            let here = head.pose(f64::from(tick) / f64::from(RATE)).position;
+            for triangle in &scene.triangles {
+                let [a, b, c] = triangle
+                    .positions
+                    .map(|p| scene.positions[p as usize] - here);
+                let reach = a.length().min(b.length()).min(c.length());
+                assert!(reach > 0.15, "{here} is in a corner");
+                // Where the triangle's plane is near, its foot is outside of the triangle.
+                let normal = (b - a).cross(c - a).normalize_or_zero();
+                let foot = normal * normal.dot(a);
+                let inside = [(a, b), (b, c), (c, a)]
+                    .iter()
+                    .all(|(p, q)| (*q - *p).cross(foot - *p).dot(normal) > 0.0);
+                let off = foot.length();
+                assert!(
+                    off > 0.15 || !inside || normal == Vec3::ZERO,
+                    "{here} is in a wall"
+                );
+            }
         }
     }
 

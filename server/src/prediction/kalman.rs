@@ -28,6 +28,9 @@ const LONGEST_LEAD: f64 = 1.0;
 /// are those of heads that go their way.
 const JUMP_DEVIATIONS: f64 = 6.0;
 const JUMP: [f64; 2] = [0.2, 0.4];
+/// A rate that is off by more is a tracker's mistake, m/s and rad/s: heads need many
+/// reports to change theirs by so much.
+const RATE_JUMP: f64 = 3.0;
 /// Faster than any head, m/s and rad/s: a rate beyond it is passed over.
 const FASTEST: f64 = 40.0;
 /// Deviations that a doubt is of.
@@ -270,7 +273,8 @@ impl Track {
     /// is known.
     fn correct(&mut self, dynamics: &Dynamics, off: DVec3, rate: Option<DVec3>) {
         self.correct_one(0, off, dynamics.noise[0]);
-        if let Some(rate) = rate {
+        let most = RATE_JUMP + JUMP_DEVIATIONS * self.covariance.y_axis.y.max(0.0).sqrt();
+        if let Some(rate) = rate.filter(|rate| rate.distance(self.rate) < most) {
             self.correct_one(1, rate - self.rate, dynamics.noise[1]);
         }
     }

@@ -5,8 +5,8 @@
 //! takes its place. [`Horizon`] is that time, as measured; heads are predicted at
 //! steps of it ([`HeadFilter`]), and each is seen from by both eyes. What prediction
 //! may miss is covered twice: turning by an enlarged image plane, moving by
-//! viewpoints at the corners of a square about the last head. Both grow with what
-//! the filter doubts, and so with the interval.
+//! viewpoints at the corners of a square about the head. Both grow with what the
+//! filter doubts, and so with the interval.
 //!
 //! Sources: Mueller et al., "Shading Atlas Streaming", 2018, section 3.1 and figure
 //! 5; Kravec, "Realistic Remote Rendering for VR and Mobile Devices", 2023,
@@ -131,34 +131,20 @@ impl Prediction {
         f32::from(self.view.eye_resolution[0]) / (fov.right - fov.left)
     }
 
-    /// From where patches are looked for: both eyes of every head, and the corners in
-    /// place of those of the last.
+    /// From where patches are looked for: two corners of the square about each head,
+    /// at either end of a diagonal, and of the other diagonal for every second head.
+    /// They stand in for the eyes, so that corners cost no pictures.
     #[must_use]
     pub fn viewpoints(&self) -> Vec<Viewpoint> {
-        let (last, others) = self.heads.split_last().expect("there is at least one head");
-        let seen_from = |head: &PredictedHead, eyes: &[EyeView]| -> Vec<Viewpoint> {
-            let viewpoint = |eye: &EyeView| {
-                let enlargement = enlargement(eye.fov, head.doubt.radians);
-                Viewpoint::new(
-                    head.after,
-                    head.world_from_head,
-                    *eye,
-                    &self.view,
-                    enlargement,
-                )
-            };
-            eyes.iter().map(viewpoint).collect()
+        let seen_from = |(index, head): (usize, &PredictedHead)| {
+            let [a, b, c, d] = corners(self.view.eyes, head.doubt.metres);
+            let eyes = if index % 2 == 0 { [a, d] } else { [c, b] };
+            eyes.map(|eye| {
+                let factor = enlargement(eye.fov, head.doubt.radians);
+                Viewpoint::new(head.after, head.world_from_head, eye, &self.view, factor)
+            })
         };
-        let mut viewpoints: Vec<Viewpoint> = (others.iter())
-            .flat_map(|head| seen_from(head, &self.view.eyes))
-            .collect();
-        if last.doubt.metres > 0.0 {
-            let corners = corners(self.view.eyes, last.doubt.metres);
-            viewpoints.extend(seen_from(last, &corners));
-        } else {
-            viewpoints.extend(seen_from(last, &self.view.eyes));
-        }
-        viewpoints
+        self.heads.iter().enumerate().flat_map(seen_from).collect()
     }
 }
 
@@ -276,29 +262,39 @@ mod tests {
         }
     }
 
+    fn places(prediction: &Prediction) -> Vec<Vec3> {
+        let viewpoints = prediction.viewpoints();
+        viewpoints
+            .iter()
+            .map(|v| v.world_from_eye.position)
+            .collect()
+    }
+
     #[test]
-    fn both_eyes_of_every_head_are_seen_from_and_corners_of_the_last() {
+    fn both_eyes_of_every_head_are_seen_from() {
         let view = view(Fov::symmetric(1.5));
-        let mut prediction = Prediction::linear(&view, Duration::from_millis(100), 3);
-        assert_eq!(prediction.viewpoints().len(), 3 * 2, "there is no doubt");
-        let xs = |prediction: &Prediction| -> Vec<f32> {
-            let viewpoints = prediction.viewpoints();
-            viewpoints
-                .iter()
-                .map(|v| v.world_from_eye.position.x)
-                .collect()
-        };
-        for (found, expected) in xs(&prediction).into_iter().zip([-0.03, 0.03, 0.02, 0.08]) {
-            assert!((found - expected).abs() < 3e-3, "{found} {expected}");
+        let prediction = Prediction::linear(&view, Duration::from_millis(100), 3);
+        let found = places(&prediction);
+        assert_eq!(found.len(), 6);
+        for (found, head) in found.chunks(2).zip(&prediction.heads) {
+            let eyes = view
+                .eyes
+                .map(|eye| head.world_from_head.then(eye.head_from_eye));
+            assert_eq!(found, eyes.map(|eye| eye.position));
         }
-        prediction.heads.truncate(1);
-        prediction.heads[0].doubt.metres = 0.01;
-        assert_eq!(prediction.viewpoints().len(), 4);
-        for (found, expected) in xs(&prediction).into_iter().zip([-0.04, 0.04, -0.04, 0.04]) {
-            assert!((found - expected).abs() < 1e-6);
+    }
+
+    #[test]
+    fn two_heads_have_all_four_corners_about_them() {
+        let view = view(Fov::symmetric(1.5));
+        let mut prediction = Prediction::linear(&view, Duration::ZERO, 2);
+        for head in &mut prediction.heads {
+            head.doubt.metres = 0.01;
         }
-        let last = prediction.viewpoints()[3];
-        assert!((last.world_from_eye.position.y + 0.01).abs() < 1e-6);
+        let expected = [(-0.04, 0.01), (0.04, -0.01), (-0.04, -0.01), (0.04, 0.01)];
+        for (found, (x, y)) in places(&prediction).into_iter().zip(expected) {
+            assert!(found.distance(vec3(x, y, 0.0)) < 1e-6, "{found}");
+        }
     }
 
     #[test]

@@ -177,6 +177,20 @@ fn what_is_no_pose_is_passed_over() {
 }
 
 #[test]
+fn one_wrong_rate_does_not_turn_the_head() {
+    let mut filter = HeadFilter::new(&steady_report(0));
+    for tick in 1..90 {
+        let mut told = steady_report(tick);
+        if tick % 30 == 29 {
+            told.angular_velocity = Vec3::X * 12.0;
+            told.linear_velocity = Vec3::X * 9.0;
+        }
+        filter.tell(&told);
+    }
+    assert_follows(&filter, 89);
+}
+
+#[test]
 fn where_time_or_the_head_jumps_the_filter_begins_anew() {
     let mut filter = HeadFilter::new(&steady_report(10_000));
     for tick in 10_001..10_090 {
