@@ -200,6 +200,7 @@ fn what_is_behind_the_eye_is_not_seen_and_what_reaches_past_it_is() {
 #[test]
 #[ignore = "needs a Vulkan driver"]
 fn broken_triangles_hide_nothing() {
+    // What is no number, no scene is loaded with.
     let broken = [
         [Vec3::ZERO; 3],
         [vec3(0.0, 0.0, -1.0); 3],
@@ -213,16 +214,16 @@ fn broken_triangles_hide_nothing() {
             vec3(1.0, 0.0, -1.0),
             vec3(1.0, 1e-30, -1.0),
         ],
+        // Of numbers that products of do not hold.
         [
-            vec3(0.0, 0.0, f32::NAN),
-            vec3(1.0, 0.0, -1.0),
-            vec3(0.0, 1.0, -1.0),
+            vec3(1e18, -1e18, -1.0),
+            vec3(1e18, 1e18, -1.0),
+            vec3(1e18, 0.0, -1.0),
         ],
-        [Vec3::NAN; 3],
         [
-            Vec3::NEG_Z,
-            vec3(f32::INFINITY, 0.0, -1.0),
-            vec3(f32::INFINITY, 1.0, -1.0),
+            vec3(-1e30, 0.0, 1e-3),
+            vec3(1e30, 0.0, 1e-3),
+            vec3(0.0, 1e-3, 1e-3),
         ],
     ];
     for corners in broken {
@@ -300,7 +301,7 @@ fn any_head_however_doubtful_gives_a_frame() {
     for degrees in [1.0_f32, 90.0, 170.0] {
         for doubt in [0.0, 0.1, 1e9, f32::INFINITY] {
             let doubt = Doubt {
-                metres: doubt.min(1e9),
+                metres: doubt,
                 radians: doubt,
             };
             let heads = [Pose::IDENTITY; 12];
@@ -308,7 +309,7 @@ fn any_head_however_doubtful_gives_a_frame() {
                 let fov = Fov::symmetric(degrees.to_radians());
                 let heads = &heads[..count];
                 let frame = frame(&mut pipeline, fov, number, heads, doubt);
-                assert!(count == 1 || frame.stats.visible > 0, "{degrees} {doubt:?}");
+                assert!(frame.stats.visible > 0, "{degrees} {doubt:?}");
                 assert_eq!(frame.stats.unplaced, 0);
                 number += 1;
             }

@@ -86,7 +86,7 @@ impl Extent {
                 side: options.side.unwrap_or(512),
                 predicted_seconds: 60.0,
                 drawn_seconds: 4.0,
-                moments: 24,
+                moments: 16,
                 latencies: &LATENCIES,
                 gaits: &GAITS,
             }
@@ -184,7 +184,12 @@ fn measure(
     let last = GAITS[GAITS.len() - 1].name;
     let choices = is_first && [WALK.name, last].contains(&gait.name);
     let predictors = PREDICTORS.iter().filter(|_| is_first).chain([&SERVED]);
-    let compared = predictors.map(|policy| (policy, extent.latencies));
+    let latencies = if gait.name == WALK.name {
+        extent.latencies
+    } else {
+        &CHOSEN_AT
+    };
+    let compared = predictors.map(|policy| (policy, latencies));
     let chosen = CHOICES.iter().filter(|_| choices);
     let cases: Vec<(&Policy, u32)> = compared
         .chain(chosen.map(|policy| (policy, &CHOSEN_AT[..])))

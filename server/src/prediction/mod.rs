@@ -31,6 +31,9 @@ const NEAR: f32 = 0.02;
 /// Largest factor by which an image plane grows: beyond it most of the pictures would
 /// be margin.
 const MOST_ENLARGED: f32 = 1.5;
+/// Farthest that viewpoints stand aside of where eyes are expected, metres: about as
+/// far as eyes are apart. From farther away they would see another scene.
+const MOST_ASIDE: f32 = 0.06;
 
 /// A head that may be, some time from now.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -154,6 +157,7 @@ impl Prediction {
 #[must_use]
 pub fn corners(eyes: [EyeView; 2], aside: f32) -> [EyeView; 4] {
     let [left, right] = eyes;
+    let aside = aside.min(MOST_ASIDE);
     let moved = |eye: EyeView, x: f32, y: f32| EyeView {
         head_from_eye: Pose {
             position: eye.head_from_eye.position + vec3(x, y, 0.0) * aside,
