@@ -5,14 +5,14 @@ use std::time::Duration;
 
 use glam::{Quat, Vec3, vec3};
 use shadecast_protocol::{
-    ClientTime, EyeView, Fov, FrameId, Pose, UpdateTiming, ViewReport, ViewSeq,
+    ClientTime, EyeView, Fov, FrameId, ObjectId, Pose, UpdateTiming, ViewReport, ViewSeq,
 };
 use shadecast_server::{
     Frame, FrameOrder, Gpu, GpuScene, Integrator, Pipeline, Prediction, Visibility,
     encode::OpenH264,
     patches::{self, PatchLimits, PatchedScene},
     prediction::{Doubt, PredictedHead, Viewpoint},
-    scene::{Corner, Material, Scene, Triangle},
+    scene::{Corner, Material, RigidObject, Scene, Triangle},
 };
 
 const SIDE: u16 = 64;
@@ -76,7 +76,7 @@ fn add_triangle(scene: &mut Scene, corners: [Vec3; 3]) {
         positions: [0, 1, 2].map(|corner| first_position + corner),
         corners: [0, 1, 2].map(|corner| first_corner + corner),
         material,
-        object: shadecast_protocol::ObjectId::WORLD,
+        object: ObjectId::WORLD,
     });
 }
 
@@ -104,9 +104,9 @@ fn seen(scene: Scene, viewpoints: &[Viewpoint]) -> Vec<(u32, Vec<u32>)> {
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        visibility.record(&gpu, &mut encoder, &gpu_scene, &[*viewpoint], |_| {
-            Vec::new()
-        });
+        let objects_after = |after| scene.scene.poses(after);
+        let viewpoints = &[*viewpoint];
+        visibility.record(&gpu, &mut encoder, &gpu_scene, viewpoints, objects_after);
         gpu.queue.submit([encoder.finish()]);
         let bytes = scene.patches.len() as u64 * 4;
         let pixels: Vec<u32> = gpu.read(visibility.pixels(), 0..bytes).expect("pixels");
@@ -240,6 +240,43 @@ fn broken_triangles_hide_nothing() {
             );
         }
     }
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn objects_are_seen_where_they_will_be() {
+    let mut scene = room();
+    let corners = [
+        vec3(-0.5, -0.5, -1.0),
+        vec3(0.5, -0.5, -1.0),
+        vec3(0.0, 0.5, -1.0),
+    ];
+    add_triangle(&mut scene, corners);
+    scene.triangles.last_mut().expect("it was added").object = ObjectId(1);
+    // From behind the eye to before it in a second.
+    let keys = [(0, 1.5), (1, 0.0), (2, 0.0)];
+    scene.objects.push(RigidObject {
+        name: "slide".to_owned(),
+        keys: keys
+            .map(|(seconds, z)| {
+                (
+                    Duration::from_secs(seconds),
+                    at(Vec3::Z * z, Quat::IDENTITY),
+                )
+            })
+            .into(),
+    });
+    let after = |milliseconds| Viewpoint {
+        after: Duration::from_millis(milliseconds),
+        ..ahead(90.0, Pose::IDENTITY)
+    };
+    let found = seen(scene, &[after(0), after(500), after(1000)]);
+    let pixels: Vec<u32> = found.iter().map(|(_, others)| others[0]).collect();
+    assert_eq!(pixels[0], 0, "it is behind");
+    // A metre away it is half as wide and half as high as the picture; a quarter of that
+    // away it overfills it.
+    assert!(pixels[1] > ALL / 2, "{pixels:?}");
+    assert!(pixels[2].abs_diff(ALL / 8) < ALL / 100, "{pixels:?}");
 }
 
 /// A frame of the whole server for heads at these places.
