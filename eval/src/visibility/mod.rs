@@ -5,9 +5,11 @@
 //! off ([`predict`]), coverage and overestimation of visible sets ([`coverage`]), and
 //! pixels that a client would miss ([`client`]), by time and by choices of the server.
 
+mod charts;
 mod client;
 mod coverage;
 mod page;
+mod policy;
 mod predict;
 mod seer;
 mod trace;
@@ -19,7 +21,8 @@ use clap::Args;
 use shadecast_server::scene::{self, Scene};
 
 use self::{
-    client::{CHOICES, PREDICTORS, Policy, SERVED, Truth},
+    client::Truth,
+    policy::{CHOICES, PREDICTORS, Policy, SERVED},
     seer::Seer,
     trace::{GAITS, Gait, Head, RATE, WALK},
 };
