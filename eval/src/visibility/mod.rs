@@ -1,9 +1,9 @@
 //! `shadecast-eval visibility`: what is found to be visible, against what is seen.
 //!
-//! Heads walk through a scene and look around ([`trace`]); the server's predictors and
+//! Heads walk through a scene and look around (`trace`); the server's predictors and
 //! its very passes find what they may see. Measured are how far predicted heads are
-//! off ([`predict`]), coverage and overestimation of visible sets ([`coverage`]), and
-//! pixels that a client would miss ([`client`]), by time and by choices of the server.
+//! off (`predict`), coverage and overestimation of visible sets (`coverage`), and
+//! pixels that a client would miss (`client`), by time and by choices of the server.
 
 mod charts;
 mod client;
