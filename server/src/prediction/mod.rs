@@ -26,6 +26,7 @@ use shadecast_protocol::{Motion, Pose, ViewReport};
 
 pub use horizon::{Horizon, Latency};
 pub use kalman::{Doubt, HeadFilter};
+use viewpoint::margin;
 pub use viewpoint::{Viewpoint, corners, enlargement};
 
 /// A head that may be, some time from now.
@@ -50,7 +51,8 @@ pub struct Prediction {
 
 impl Prediction {
     /// `samples` heads, evenly over `horizon` from the report on, by linear
-    /// extrapolation of its velocities, and without any doubt.
+    /// extrapolation of its velocities; image planes are 1.2 times as wide as the eyes'
+    /// own, and nothing stands aside (SAS 2018, section 5).
     #[must_use]
     pub fn linear(view: &ViewReport, horizon: Duration, samples: u32) -> Self {
         let horizon = Horizon {
@@ -62,10 +64,14 @@ impl Prediction {
             linear_velocity: view.linear_velocity,
             angular_velocity: view.angular_velocity,
         };
+        let doubt = Doubt {
+            radians: margin(view.eyes[0].fov, 1.2),
+            ..Doubt::NONE
+        };
         let head = |after: Duration| PredictedHead {
             after,
             world_from_head: motion.after(after.as_secs_f32()),
-            doubt: Doubt::NONE,
+            doubt,
         };
         Self {
             heads: horizon.samples(samples).map(head).collect(),

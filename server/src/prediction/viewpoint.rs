@@ -39,10 +39,7 @@ pub fn corners(eyes: [EyeView; 2], aside: f32) -> [EyeView; 4] {
 /// The factor of an image plane that shows `margin` radians more on its widest side.
 #[must_use]
 pub fn enlargement(fov: Fov, margin: f32) -> f32 {
-    let sides = [fov.left, fov.right, fov.up, fov.down];
-    let widest = sides
-        .into_iter()
-        .fold(0.0, |widest: f32, side| widest.max(side.abs()));
+    let widest = widest(fov);
     let beyond = (widest + margin).min(89.5_f32.to_radians());
     let factor = beyond.tan() / widest.tan();
     // False for NaN, which no valid field of view gives.
@@ -51,6 +48,18 @@ pub fn enlargement(fov: Fov, margin: f32) -> f32 {
     } else {
         1.0
     }
+}
+
+/// The margin that an image plane larger by this factor shows.
+pub(super) fn margin(fov: Fov, factor: f32) -> f32 {
+    let widest = widest(fov);
+    (widest.tan() * factor).atan() - widest
+}
+
+/// The angle of the widest side.
+fn widest(fov: Fov) -> f32 {
+    let sides = [fov.left, fov.right, fov.up, fov.down];
+    sides.into_iter().map(f32::abs).fold(0.0, f32::max)
 }
 
 /// A picture of patch ids that is to be drawn.
@@ -113,6 +122,10 @@ mod tests {
         assert_eq!(wide(view.eyes[0].fov, 0.0), 1.0);
         let factor = wide(view.eyes[0].fov, 0.05);
         assert!((factor - (0.8_f32.tan() / 0.75_f32.tan())).abs() < 1e-4);
+        for factor in [1.0, 1.2, 1.4] {
+            let fov = view.eyes[0].fov;
+            assert!((enlargement(fov, margin(fov, factor)) - factor).abs() < 1e-5);
+        }
         let viewpoint = |factor| {
             let head = Pose::IDENTITY;
             Viewpoint::new(Duration::ZERO, head, view.eyes[0], &view, factor)
