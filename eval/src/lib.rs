@@ -19,6 +19,7 @@ pub mod sequence;
 pub mod speed;
 pub mod stress;
 pub mod svgf;
+pub mod visibility;
 
 /// Where figures go unless told otherwise; their files have the commands' names.
 pub(crate) const OUT: &str = "eval-out";

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use shadecast_eval::{convergence, demo, leave_out, packing, sequence, speed, stress};
+use shadecast_eval::{convergence, demo, leave_out, packing, sequence, speed, stress, visibility};
 
 /// Measures what shadecast shows against what it should show.
 #[derive(Parser)]
@@ -54,6 +54,13 @@ enum Command {
     ///
     /// Writes stress.csv and .md, and fails where something does not hold.
     Stress(stress::Options),
+    /// Measures what is found to be visible against what is seen.
+    ///
+    /// How far predicted heads are off, coverage and overestimation of visible sets,
+    /// and pixels that a client would miss, by predictor, horizon, speed of the head and
+    /// choice of viewpoints. Writes visibility.csv, .md, .svg and .png,
+    /// visibility-missing.csv and visibility-prediction.csv.
+    Visibility(visibility::Options),
 }
 
 fn main() -> ExitCode {
@@ -65,6 +72,7 @@ fn main() -> ExitCode {
         Command::Sequence(options) => sequence::run(&options),
         Command::Speed(options) => speed::run(&options),
         Command::Stress(options) => stress::run(&options),
+        Command::Visibility(options) => visibility::run(&options),
     };
     match done {
         Ok(table) => {

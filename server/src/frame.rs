@@ -17,9 +17,10 @@ use crate::{
     packer::Packer,
     patches::{Patch, PatchedScene},
     picture::PictureConversion,
+    prediction::Prediction,
     scene::{Material, Scene, SceneFacts},
     snake::SnakeError,
-    visibility::{Prediction, Visibility, eye_of},
+    visibility::Visibility,
 };
 
 /// Samples over which a diffuse texel's mean runs at most: beyond it the error
@@ -249,7 +250,7 @@ impl Pipeline {
         let poses: Vec<Pose> = motions.iter().map(|motion| motion.pose).collect();
         self.gpu_scene.set_poses(&self.gpu, &poses);
 
-        let eye = eye_of(&order.prediction);
+        let eye = order.prediction.eye();
         let in_objects = poses.iter().map(|pose| pose.inverse().transform_point(eye));
         let eyes: Vec<Vec3> = std::iter::once(eye).chain(in_objects).collect();
         let pixels_per_radian = order.prediction.pixels_per_radian();
@@ -257,8 +258,10 @@ impl Pipeline {
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        let viewpoints = order.prediction.viewpoints();
+        let objects_after = |after| self.scene.scene.poses(order.scene_time + after);
         self.visibility
-            .record(gpu, &mut encoder, gpu_scene, &order.prediction, &poses);
+            .record(gpu, &mut encoder, gpu_scene, &viewpoints, objects_after);
         let placed = (self.packer).place(gpu, gpu_scene, encoder, &eyes, pixels_per_radian)?;
         stages.visibility = lap();
 

@@ -13,6 +13,7 @@ mod mask;
 mod packer;
 pub mod patches;
 mod picture;
+pub mod prediction;
 pub mod scene;
 mod session;
 pub mod snake;
@@ -30,6 +31,7 @@ pub mod kernels {
 
 pub use frame::{Frame, FrameError, FrameOrder, FrameStats, Pipeline, Stages};
 pub use gpu::{Gpu, GpuError, GpuScene, Integrator};
+pub use prediction::Prediction;
 pub use session::{Input, Output, Session, SessionConfig};
 pub use shadecast_shaders::picture::displayed as tone_map;
-pub use visibility::Prediction;
+pub use visibility::Visibility;

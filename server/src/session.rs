@@ -16,15 +16,9 @@ use shadecast_protocol::{
 
 use crate::{
     frame::{Frame, FrameOrder},
-    visibility::Prediction,
+    prediction::{HeadFilter, Latency, Prediction},
 };
 
-/// Horizon before any acknowledgement told how long updates take.
-const FIRST_HORIZON: Duration = Duration::from_millis(150);
-/// Beyond this a linear prediction is worth nothing.
-const LONGEST_HORIZON: Duration = Duration::from_millis(500);
-/// Weight of a new measurement of the latency.
-const LATENCY_WEIGHT: f64 = 0.1;
 /// Weight of a new measurement of the light stage's speed.
 const SPEED_WEIGHT: f64 = 0.3;
 /// Paths of the first frame, before their speed is known.
@@ -43,7 +37,7 @@ pub struct SessionConfig {
     pub frame_period: Duration,
     /// Time for the light stage of a frame.
     pub light_budget: Duration,
-    /// Heads sampled over the horizon.
+    /// Most heads sampled over the horizon.
     pub head_samples: u32,
 }
 
@@ -91,15 +85,20 @@ enum State {
 #[derive(Clone, Debug)]
 struct Stream {
     next_frame: FrameId,
-    view: Option<(ServerTime, ViewReport)>,
+    heard: Option<Heard>,
     started: Option<ServerTime>,
     in_the_making: bool,
     new_client: bool,
     reset: bool,
-    /// From the sampling of a pose to the first light of the frame made for it, seconds.
-    latency: Option<f64>,
-    /// Between two frames, seconds.
-    period: f64,
+    latency: Latency,
+}
+
+/// What the client said of its head.
+#[derive(Clone, Debug)]
+struct Heard {
+    received: ServerTime,
+    view: ViewReport,
+    filter: HeadFilter,
 }
 
 /// One client's session.
@@ -136,11 +135,11 @@ impl Session {
         matches!(self.state, State::Streaming(_))
     }
 
-    /// Median-like estimate of the time from a pose to its light.
+    /// Mean of late of the time from a pose to its light.
     #[must_use]
     pub fn latency(&self) -> Option<Duration> {
         match &self.state {
-            State::Streaming(stream) => stream.latency.map(Duration::from_secs_f64),
+            State::Streaming(stream) => stream.latency.motion_to_photon(),
             _ => None,
         }
     }
@@ -183,22 +182,16 @@ impl Session {
             State::Streaming(stream) => stream,
             _ => return None,
         };
-        let (view_received, view) = stream.view?;
-        let due = stream
-            .started
-            .is_none_or(|last| elapsed(last, now) >= self.config.frame_period);
+        let heard = stream.heard.as_ref()?;
+        let since_last = stream.started.map(|last| elapsed(last, now));
+        let due = since_last.is_none_or(|time| time >= self.config.frame_period);
         if stream.in_the_making || !due || pictures_in_flight > MOST_IN_FLIGHT {
             return None;
         }
-        if let Some(last) = stream.started {
-            let period = elapsed(last, now).as_secs_f64().min(1.0);
-            stream.period += (period - stream.period) * LATENCY_WEIGHT;
-        }
-        let horizon = stream.latency.map_or(FIRST_HORIZON, |latency| {
-            Duration::from_secs_f64(latency + stream.period).min(LONGEST_HORIZON)
-        });
-        // Objects stand where they will be halfway through the frame's time on display.
-        let lead = horizon.saturating_sub(Duration::from_secs_f64(stream.period * 0.5));
+        let age = elapsed(heard.received, now);
+        stream.latency.begun(stream.next_frame, since_last, age);
+        let horizon = stream.latency.horizon();
+        let (view, most) = (&heard.view, self.config.head_samples);
         let paths = self.speed.map_or(FIRST_PATHS, |speed| {
             (speed * self.config.light_budget.as_secs_f64()).clamp(256.0, f64::from(1 << 26)) as u32
         });
@@ -206,16 +199,16 @@ impl Session {
         stream.in_the_making = true;
         let order = FrameOrder {
             frame: stream.next_frame,
-            prediction: Prediction::linear(&view, horizon, self.config.head_samples),
+            prediction: Prediction::filtered(view, &heard.filter, age, horizon, most),
             scene_time: Duration::from_nanos(now.0),
-            objects_lead: lead,
+            objects_lead: horizon.middle(),
             paths,
             reset: std::mem::take(&mut stream.reset),
             new_client: std::mem::take(&mut stream.new_client),
             timing: UpdateTiming {
                 view: view.seq,
                 view_sampled: view.sampled_at,
-                view_received,
+                view_received: heard.received,
                 started: now,
                 finished: now,
             },
@@ -234,16 +227,19 @@ impl Session {
                 self.close("it said hello twice".to_owned())
             }
             (State::Streaming(stream), ToServer::View(view)) => {
-                let newer = stream.view.is_none_or(|(_, known)| view.seq > known.seq);
-                if newer {
-                    stream.view = Some((received, view));
+                let heard = stream.heard.get_or_insert_with(|| Heard {
+                    received,
+                    view,
+                    filter: HeadFilter::new(&view),
+                });
+                if view.seq > heard.view.seq {
+                    heard.filter.tell(&view);
+                    (heard.received, heard.view) = (received, view);
                 }
             }
             (State::Streaming(stream), ToServer::Acknowledge(acknowledgement)) => {
-                let seconds = acknowledgement.motion_to_photon as f64 * 1e-9;
-                let seconds = seconds.min(LONGEST_HORIZON.as_secs_f64());
-                let latency = stream.latency.get_or_insert(seconds);
-                *latency += (seconds - *latency) * LATENCY_WEIGHT;
+                let seen_after = Duration::from_nanos(acknowledgement.motion_to_photon);
+                stream.latency.seen(acknowledgement.frame, seen_after);
             }
             (State::Streaming(stream), ToServer::RequestReset(_)) => stream.reset = true,
             (State::Streaming(_), ToServer::Bye) => self.close("it said goodbye".to_owned()),
@@ -270,13 +266,12 @@ impl Session {
             .push_back(Output::Send(ToClient::Welcome(self.config.welcome.clone())));
         self.state = State::Streaming(Box::new(Stream {
             next_frame: FrameId(0),
-            view: None,
+            heard: None,
             started: None,
             in_the_making: false,
             new_client: true,
             reset: true,
-            latency: None,
-            period: self.config.frame_period.as_secs_f64(),
+            latency: Latency::new(self.config.frame_period),
         }));
     }
 

@@ -1,85 +1,32 @@
 //! Which patches may be seen until the next update takes effect.
 //!
-//! Each viewpoint is drawn as a picture of patch ids over an enlarged field of
-//! view; a compute pass counts the pixels of each patch. The union over both
-//! eyes of the current and the extrapolated heads is the potentially visible
-//! set. What is too small to meet a pixel's centre in every picture is met sooner
-//! or later, since each picture's pixels lie elsewhere, and the atlas keeps a patch
-//! for a while after it was last in the set.
+//! From each viewpoint of a prediction a picture of patch ids is drawn; a compute
+//! pass counts the pixels of each patch. The union over all viewpoints is the
+//! potentially visible set. What is too small to meet a pixel's centre in every
+//! picture is met sooner or later, since each picture's pixels lie elsewhere, and
+//! the atlas keeps a patch for a while after it was last in the set
+//! ([`KEEP_UNSEEN`](crate::atlas::KEEP_UNSEEN)).
 //!
 //! Source: SAS 2018, section 3.1 and figure 5.
 
 use std::time::Duration;
 
-use glam::{Mat4, Vec2, Vec3, vec2};
-use shadecast_protocol::{Fov, Pose, ViewReport};
+use glam::{Mat4, Vec2, vec2};
+use shadecast_protocol::Pose;
 use shadecast_shaders::visibility::{IDS_SOURCE, MARK_SOURCE, seen_words};
 use wgpu::ShaderStages;
 
 use crate::{
     gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout},
     patches::{DrawRange, PatchedScene},
+    prediction::Viewpoint,
 };
 
-/// Image plane of the id pictures relative to the eye's own (SAS 2018, section 5).
-const ENLARGEMENT: f32 = 1.2;
-/// Nearest thing that is drawn, metres: nearer than a face lets things come.
-const NEAR: f32 = 0.02;
-/// Largest side of an id picture; beyond it pixels grow instead.
-const LARGEST_SIDE: u32 = 4096;
-
-/// Where the eyes are sampled.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Prediction {
-    /// Heads, from the reported one to the one at the end of the horizon.
-    pub world_from_heads: Vec<Pose>,
-    /// The report that they come from.
-    pub view: ViewReport,
-}
-
-impl Prediction {
-    /// `samples` heads, evenly over `horizon` from the report on, by linear
-    /// extrapolation of its velocities.
-    #[must_use]
-    pub fn linear(view: &ViewReport, horizon: Duration, samples: u32) -> Self {
-        let step = horizon.as_secs_f32() / (samples.max(2) - 1) as f32;
-        let world_from_heads = (0..samples.max(1))
-            .map(|i| {
-                let seconds = step * i as f32;
-                view.world_from_head.extrapolate(
-                    view.linear_velocity,
-                    view.angular_velocity,
-                    seconds,
-                )
-            })
-            .collect();
-        Self {
-            world_from_heads,
-            view: *view,
-        }
-    }
-
-    /// The head in the middle of the horizon.
-    #[must_use]
-    pub fn middle(&self) -> Pose {
-        let last = self.world_from_heads.len() - 1;
-        let (a, b) = (
-            self.world_from_heads[last / 2],
-            self.world_from_heads[last.div_ceil(2)],
-        );
-        Pose {
-            position: a.position.lerp(b.position, 0.5),
-            orientation: a.orientation.slerp(b.orientation, 0.5),
-        }
-    }
-
-    /// Pixels per radian in the middle of the left eye's picture.
-    #[must_use]
-    pub fn pixels_per_radian(&self) -> f32 {
-        let fov = self.view.eyes[0].fov;
-        f32::from(self.view.eye_resolution[0]) / (fov.right - fov.left)
-    }
-}
+/// Most pictures of a frame: two of each of eight heads.
+const MOST_PICTURES: usize = 2 * 8;
+/// Sides of the target are rounded up to these, pixels: pictures that are a little
+/// larger than the last ones need no new one.
+const TARGET_STEP: u32 = 64;
 
 /// The pass that finds the potentially visible set.
 #[derive(Debug)]
@@ -117,7 +64,7 @@ impl Visibility {
                 patch_of_triangle[patch.first_triangle as usize + k] = id;
             }
         }
-        let most_matrices = 2 * 8 * (scene.scene.objects.len() + 1);
+        let most_matrices = MOST_PICTURES * (scene.scene.objects.len() + 1);
         let matrices = gpu.scratch("view matrices", (most_matrices * size_of::<Mat4>()) as u64)?;
         let patch_of_triangle = gpu.storage(
             "patch of triangle",
@@ -213,53 +160,51 @@ impl Visibility {
         &self.counts
     }
 
-    /// Records the finding of the potentially visible set.
+    /// Records the finding of what is seen from any of the first 16 `viewpoints`.
     ///
-    /// `poses[n]` is `world_from_object` of `ObjectId(n + 1)`.
+    /// `objects_after` tells `world_from_object` of all objects, `ObjectId(1)` first,
+    /// so long after the beginning of the frame.
     pub fn record(
         &mut self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         gpu_scene: &GpuScene,
-        prediction: &Prediction,
-        poses: &[Pose],
+        viewpoints: &[Viewpoint],
+        objects_after: impl Fn(Duration) -> Vec<Pose>,
     ) {
-        let [width, height] = prediction.view.eye_resolution;
-        let enlarged = |side: u16| ((f32::from(side) * ENLARGEMENT) as u32).clamp(16, LARGEST_SIDE);
-        self.ensure_target(gpu, (enlarged(width), enlarged(height)));
+        encoder.clear_buffer(&self.counts, 0, None);
+        let viewpoints = &viewpoints[..viewpoints.len().min(MOST_PICTURES)];
+        let largest = viewpoints.iter().map(|viewpoint| viewpoint.size);
+        let Some(size) = largest.reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])]) else {
+            return;
+        };
+        let [width, height] = size.map(|side| side.next_multiple_of(TARGET_STEP));
+        self.ensure_target(gpu, (width, height));
         let Some(target) = &self.target else {
             return;
         };
-
-        let pixels = vec2(target.size.0 as f32, target.size.1 as f32);
-        let views: Vec<Mat4> = (prediction.world_from_heads.iter())
-            .flat_map(|head| prediction.view.eyes.map(|eye| (*head, eye)))
-            .zip(self.pictures..)
-            .map(|((head, eye), picture)| {
-                let offset = offset_of(picture) * 2.0 / pixels;
-                Mat4::from_translation(offset.extend(0.0))
-                    * clip_from_world(head.then(eye.head_from_eye), eye.fov)
-            })
-            .collect();
-        self.pictures = self.pictures.wrapping_add(views.len() as u32);
-        let objects = poses.len() + 1;
-        let matrices: Vec<Mat4> = views
-            .iter()
-            .flat_map(|view| {
-                std::iter::once(*view).chain(poses.iter().map(move |pose| *view * pose.matrix()))
-            })
-            .take(self.most_matrices)
-            .collect();
+        let mut matrices: Vec<Mat4> = Vec::new();
+        for (viewpoint, picture) in viewpoints.iter().zip(self.pictures..) {
+            let pixels = vec2(viewpoint.size[0] as f32, viewpoint.size[1] as f32);
+            let offset = offset_of(picture) * 2.0 / pixels;
+            let view = Mat4::from_translation(offset.extend(0.0)) * viewpoint.clip_from_world();
+            matrices.push(view);
+            let poses = objects_after(viewpoint.after);
+            matrices.extend(poses.iter().map(|pose| view * pose.matrix()));
+        }
+        matrices.truncate(self.most_matrices);
+        self.pictures = self.pictures.wrapping_add(viewpoints.len() as u32);
         gpu.queue
             .write_buffer(&self.matrices, 0, bytemuck::cast_slice(&matrices));
 
-        encoder.clear_buffer(&self.counts, 0, None);
-        for view in 0..matrices.len() / objects {
-            self.record_ids(encoder, target, gpu_scene, (view * objects) as u32);
+        let of_each = matrices.len() / viewpoints.len();
+        for (viewpoint, first_matrix) in viewpoints.iter().zip((0..).step_by(of_each)) {
+            let [width, height] = viewpoint.size;
+            self.record_ids(encoder, target, gpu_scene, viewpoint.size, first_matrix);
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor::default());
             pass.set_pipeline(&self.mark);
             pass.set_bind_group(0, &target.mark_group, &[]);
-            pass.dispatch_workgroups(target.size.0.div_ceil(32), target.size.1.div_ceil(8), 1);
+            pass.dispatch_workgroups(width.div_ceil(32), height.div_ceil(8), 1);
         }
     }
 
@@ -268,6 +213,7 @@ impl Visibility {
         encoder: &mut wgpu::CommandEncoder,
         target: &Target,
         gpu_scene: &GpuScene,
+        size: [u32; 2],
         first_matrix: u32,
     ) {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
@@ -291,6 +237,9 @@ impl Visibility {
             }),
             ..Default::default()
         });
+        // A smaller picture lies in a corner of the target; the rest stays clear.
+        let [width, height] = size.map(|side| side as f32);
+        pass.set_viewport(0.0, 0.0, width, height, 0.0, 1.0);
         pass.set_bind_group(0, &gpu_scene.group, &[]);
         pass.set_bind_group(1, &self.group, &[]);
         for (pipeline, range) in &self.pipelines {
@@ -302,11 +251,7 @@ impl Visibility {
     }
 
     fn ensure_target(&mut self, gpu: &Gpu, size: (u32, u32)) {
-        if self
-            .target
-            .as_ref()
-            .is_some_and(|target| target.size == size)
-        {
+        if (self.target.as_ref()).is_some_and(|target| target.size == size) {
             return;
         }
         let texture = |format, usage| {
@@ -364,20 +309,4 @@ fn offset_of(picture: u32) -> Vec2 {
     const STEPS: [u32; 2] = [0xc13f_a9a9, 0x91e1_0da5];
     let [x, y] = STEPS.map(|step| (picture.wrapping_mul(step) >> 8) as f32 / (1 << 24) as f32);
     vec2(x, y) - 0.5
-}
-
-fn clip_from_world(world_from_eye: Pose, fov: Fov) -> Mat4 {
-    fov.enlarged(ENLARGEMENT).projection(NEAR) * world_from_eye.inverse().matrix()
-}
-
-/// The eye between both eyes, from which patches are measured and glossy
-/// texels are lit.
-#[must_use]
-pub fn eye_of(prediction: &Prediction) -> Vec3 {
-    let head = prediction.middle();
-    let eyes = prediction
-        .view
-        .eyes
-        .map(|eye| head.then(eye.head_from_eye).position);
-    (eyes[0] + eyes[1]) * 0.5
 }

@@ -167,8 +167,8 @@ fn what_the_eyes_may_see_is_placed_and_backs_are_not() {
     assert!(placed.len() < scene.patches.len(), "some is out of sight");
 
     let facets = facets(&scene);
-    let eyes: Vec<(Pose, Fov)> = (prediction.world_from_heads.iter())
-        .flat_map(|head| (prediction.view.eyes).map(|eye| (head.then(eye.head_from_eye), eye.fov)))
+    let eyes: Vec<(Pose, Fov)> = (prediction.viewpoints().iter())
+        .map(|viewpoint| (viewpoint.world_from_eye, viewpoint.fov))
         .collect();
     // What is smaller than a pixel may be missed by every pixel's centre.
     let met: HashSet<PatchId> = (eyes.iter())

@@ -315,16 +315,19 @@ pub struct LoadNotes {
 }
 
 impl Scene {
+    /// Where the objects are at `time` since the scene began, `ObjectId(1)` first.
+    #[must_use]
+    pub fn poses(&self, time: Duration) -> Vec<Pose> {
+        let at_time = |object: &RigidObject| object.world_from_object(time);
+        self.objects.iter().map(at_time).collect()
+    }
+
     /// Lowest and highest coordinates of all triangles at time zero, metres;
     /// both zero where there is none.
     #[must_use]
     pub fn bounds(&self) -> (Vec3, Vec3) {
         let poses: Vec<Pose> = std::iter::once(Pose::IDENTITY)
-            .chain(
-                self.objects
-                    .iter()
-                    .map(|o| o.world_from_object(Duration::ZERO)),
-            )
+            .chain(self.poses(Duration::ZERO))
             .collect();
         self.triangles
             .iter()

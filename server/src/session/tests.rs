@@ -251,7 +251,7 @@ fn no_frame_is_made_for_a_head_that_is_nowhere() {
     let order = session.order_frame(at(100), 0).expect("a frame is due");
     assert_eq!(order.frame, FrameId(0));
     assert!(order.new_client && order.reset);
-    assert_eq!(order.prediction.world_from_heads.len(), 2);
+    assert_eq!(order.prediction.heads.len(), 2);
 }
 
 #[test]
@@ -324,29 +324,62 @@ fn an_older_view_does_not_replace_a_newer_one() {
     assert_eq!(session.makes_frame(at(200)).timing.view, ViewSeq(6));
 }
 
+/// When the last head of an order is, and where: it moves at a metre a second.
+fn last_head(order: &FrameOrder) -> (Duration, f32) {
+    let last = order.prediction.heads.last().expect("at least one");
+    (last.after, last.world_from_head.position.x)
+}
+
 #[test]
-fn the_horizon_follows_the_latency_and_stays_bounded() {
-    let horizon = |session: &mut Session, now| {
-        let order = session.makes_frame(now);
-        // The head moves at a metre a second.
-        order.prediction.world_from_heads[1].position.x
-    };
+fn the_horizon_follows_the_latency_and_the_age_of_the_view() {
     let mut session = viewing();
-    assert!((horizon(&mut session, at(100)) - FIRST_HORIZON.as_secs_f32()).abs() < 1e-4);
-    let acknowledge = |session: &mut Session, motion_to_photon| {
+    let order = session.makes_frame(at(100));
+    let (after, x) = last_head(&order);
+    assert!(
+        after > Duration::from_millis(100),
+        "light is expected late at first"
+    );
+    let age = 0.1;
+    assert!(
+        (x - after.as_secs_f32() - age).abs() < 1e-3,
+        "{x} m in {after:?}"
+    );
+    assert!(order.objects_lead < after);
+    // 50 ms after the frame began, its light is seen.
+    let acknowledge = |session: &mut Session, frame, motion_to_photon| {
         session.hears(ToServer::Acknowledge(Acknowledgement {
-            frame: FrameId(0),
+            frame,
             motion_to_photon,
         }));
     };
-    acknowledge(&mut session, 50_000_000);
-    assert_eq!(session.latency(), Some(Duration::from_millis(50)));
-    // The latency and one period.
-    assert!((horizon(&mut session, at(100 + PERIOD)) - 0.070).abs() < 1e-4);
-    for _ in 0..100 {
-        acknowledge(&mut session, u64::MAX);
+    acknowledge(&mut session, order.frame, 150_000_000);
+    assert_eq!(session.latency(), Some(Duration::from_millis(150)));
+    let order = session.makes_frame(at(100 + PERIOD));
+    let (after, x) = last_head(&order);
+    assert_eq!(after, Duration::from_millis(50 + PERIOD));
+    assert!((x - 0.05 - 0.12 - 0.02).abs() < 1e-3, "{x} m");
+    for number in 0..100_u64 {
+        let order = session.makes_frame(at(200 + number * PERIOD));
+        acknowledge(&mut session, order.frame, u64::MAX);
+        assert!(last_head(&order).0 <= Duration::from_millis(500));
+        assert!(order.objects_lead <= Duration::from_millis(500));
     }
-    assert!(horizon(&mut session, at(200)) <= LONGEST_HORIZON.as_secs_f32() + 1e-4);
+}
+
+#[test]
+fn reports_that_come_as_they_should_not_are_survived() {
+    let mut session = viewing();
+    let mut told = view(1);
+    for (number, display_at) in (1..).zip([20, 20, 10, 40, u64::MAX, 0, 5]) {
+        told.seq = ViewSeq(number);
+        told.display_at = ClientTime(u64::saturating_mul(display_at, 1_000_000));
+        told.world_from_head.position.x = number as f32;
+        session.hears(ToServer::View(told));
+        let order = session.makes_frame(at(u64::from(number) * 100));
+        for head in &order.prediction.heads {
+            assert!(head.world_from_head.is_valid(), "{head:?}");
+        }
+    }
 }
 
 #[test]

@@ -10,11 +10,12 @@ use super::{
     watched::{texels_of, triangle},
 };
 use crate::{
+    Prediction,
     atlas::{Atlas, AtlasShape, Footprints},
     gpu::{Gpu, GpuScene, Integrator},
     patches::{self, PatchLimits},
     scene::{Scene, courtyard},
-    visibility::{Prediction, Visibility, eye_of},
+    visibility::Visibility,
 };
 
 /// A head that walks at a metre a second and turns by 20 degrees a second.
@@ -74,7 +75,7 @@ fn a_walk_through_the_courtyard_wastes_little() {
         for turn in 0..90 {
             let view = view(&scene.scene, turn as f32 / 30.0);
             let prediction = Prediction::linear(&view, Duration::from_millis(33), 2);
-            let eye = eye_of(&prediction);
+            let (eye, viewpoints) = (prediction.eye(), prediction.viewpoints());
             let mut eyes = vec![eye];
             eyes.extend(poses.iter().map(|pose| pose.inverse().transform_point(eye)));
             let pixels_per_radian = prediction.pixels_per_radian();
@@ -83,11 +84,15 @@ fn a_walk_through_the_courtyard_wastes_little() {
                     .create_command_encoder(&wgpu::CommandEncoderDescriptor::default())
             };
             let mut commands = encoder();
-            visibility.record(&gpu, &mut commands, &gpu_scene, &prediction, &poses);
+            visibility.record(&gpu, &mut commands, &gpu_scene, &viewpoints, |_| {
+                poses.clone()
+            });
             pass.record(&gpu, &mut commands, &gpu_scene, &eyes, pixels_per_radian);
             let placed = snake.place(&gpu, commands).expect("a GPU");
             let mut commands = encoder();
-            by_patch.record(&gpu, &mut commands, &cut_scene, &prediction, &poses);
+            by_patch.record(&gpu, &mut commands, &cut_scene, &viewpoints, |_| {
+                poses.clone()
+            });
             sas_pass.record(&gpu, &mut commands, &gpu_scene, &eyes, pixels_per_radian);
             let by_sas = sas.place(&gpu, commands).expect("a GPU");
             assert_eq!(placed.unplaced, 0);
