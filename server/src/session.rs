@@ -4,6 +4,7 @@
 //! The session knows who may connect, where the head was last seen, how long
 //! an update takes to be seen, and when the next frame is worth making.
 
+mod hands;
 #[cfg(test)]
 mod tests;
 
@@ -18,6 +19,8 @@ use crate::{
     frame::{Frame, FrameOrder},
     visibility::Prediction,
 };
+
+pub use hands::Hands;
 
 /// Horizon before any acknowledgement told how long updates take.
 const FIRST_HORIZON: Duration = Duration::from_millis(150);
@@ -100,6 +103,7 @@ struct Stream {
     latency: Option<f64>,
     /// Between two frames, seconds.
     period: f64,
+    hands: Hands,
 }
 
 /// One client's session.
@@ -142,6 +146,15 @@ impl Session {
         match &self.state {
             State::Streaming(stream) => stream.latency.map(Duration::from_secs_f64),
             _ => None,
+        }
+    }
+
+    /// What the client's controllers do.
+    #[must_use]
+    pub fn hands(&self) -> Hands {
+        match &self.state {
+            State::Streaming(stream) => stream.hands,
+            _ => Hands::default(),
         }
     }
 
@@ -236,6 +249,7 @@ impl Session {
             (State::Streaming(stream), ToServer::View(view)) => {
                 let newer = stream.view.is_none_or(|(_, known)| view.seq > known.seq);
                 if newer {
+                    stream.hands.take(view.hands);
                     stream.view = Some((received, view));
                 }
             }
@@ -277,6 +291,7 @@ impl Session {
             reset: true,
             latency: None,
             period: self.config.frame_period.as_secs_f64(),
+            hands: Hands::default(),
         }));
     }
 
