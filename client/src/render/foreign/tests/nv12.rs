@@ -1,7 +1,7 @@
 //! A picture as hardware decoders leave it, luma in one plane and chroma in the
 //! other, through the very sampler of the headset, beside the same picture in memory.
 //!
-//! Software drivers that sample YCbCr are Mesa's since 24. On an older one nothing
+//! Of software drivers Mesa 25's samples YCbCr and 22's does not. There nothing
 //! can be held against anything, and the test says so.
 
 use std::any::Any;
