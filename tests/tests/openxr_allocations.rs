@@ -10,12 +10,17 @@ use std::cell::Cell;
 use std::sync::Arc;
 
 use glam::Vec3;
+use shadecast_client::network::Network;
 use shadecast_client::openxr::{Headset, HeadsetConfig, Turn, api};
 use shadecast_client::render::vulkan::{DirectHost, Extras, VulkanGpu};
 use shadecast_client::render::{EyeCamera, EyeImages, Renderer, RendererConfig, frame_channel};
-use shadecast_client::{ClientFrame, ClientTiming, DecodedPicture, DrawVertex, YuvPicture};
+use shadecast_client::{
+    ClientFrame, ClientTiming, Clock, DecodedPicture, DrawVertex, HeadView, Input, OpenH264Decoder,
+    YuvPicture,
+};
 use shadecast_protocol::{
-    ClientTime, Codec, Epoch, Fov, FrameId, Method, Motion, Pose, Sky, UpdateTiming, Welcome,
+    ClientTime, Codec, Epoch, EyeView, Fov, FrameId, Method, Motion, Pose, Sky, UpdateTiming,
+    Welcome,
 };
 use shadecast_simulated_runtime::{Controller, Runtime, Script, on_crossing};
 
@@ -230,4 +235,48 @@ fn a_turn_allocates_nothing_and_drawing_no_more_than_wgpu_does() {
         in_a_turn <= alone,
         "{in_a_turn} while a turn draws, {alone} in drawing alone"
     );
+}
+
+/// The way of a report to the network's thread is a list of blocks with room for many
+/// reports each, which that thread gives back: only one that lags needs another.
+#[test]
+fn a_report_to_the_network_allocates_nothing_while_its_thread_keeps_up() {
+    let (sender, _frames) = frame_channel();
+    let (fingerprint, secret) = ("ab".repeat(32), "cd".repeat(16));
+    // Nobody is there: the reports are taken, and go no further.
+    let line = format!("shadecast://127.0.0.1:9/?fingerprint={fingerprint}&secret={secret}");
+    let network = Network::start(
+        line.parse().expect("a server's line"),
+        4096,
+        Clock::start(),
+        OpenH264Decoder::new(),
+        sender,
+    )
+    .expect("threads");
+    let eye = EyeView {
+        head_from_eye: Pose::IDENTITY,
+        fov: Fov::symmetric(1.5),
+    };
+    let view = HeadView {
+        sampled_at: ClientTime(1),
+        display_at: ClientTime(2),
+        world_from_head: Pose::IDENTITY,
+        linear_velocity: Vec3::ZERO,
+        angular_velocity: Vec3::ZERO,
+        eyes: [eye; 2],
+        eye_resolution: [256; 2],
+        hands: [None; 2],
+    };
+    let tell = |reports: u32| {
+        let before = COUNT.get();
+        for _ in 0..reports {
+            network.tell(Input::View(view));
+            std::thread::sleep(std::time::Duration::from_millis(2));
+        }
+        COUNT.get() - before
+    };
+    tell(100);
+    let allocations = tell(640);
+    println!("{allocations} allocations in 640 reports");
+    assert!(allocations <= 4, "{allocations} in 640 reports");
 }
