@@ -1,12 +1,12 @@
 //! The activity's life, and the loop that draws.
 //!
 //! Of what Android tells an activity little matters here: the headset's runtime
-//! says when to draw and owns what is drawn into, the session with the server
-//! finds its way back by itself after a sleep, and the window is not ours. So the
-//! headset is opened when the activity is first resumed, and everything ends when
-//! it is destroyed or the user leaves.
+//! says when to draw and owns what is drawn into, and the window is not ours. So the
+//! headset is opened when the activity is first resumed, the server is left while it
+//! is paused, and everything ends when it is destroyed or the user leaves.
 
-use std::sync::mpsc::{Sender, channel};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::time::Duration;
 
 use android_activity::{AndroidApp, MainEvent, PollEvent};
@@ -44,12 +44,11 @@ pub(crate) fn run(app: &AndroidApp) -> Result<()> {
             return Ok(());
         }
     }
-    // What the user in the headset is to be told of decoder and GPU.
-    let (complain, complaints) = channel();
-    let mut client = open_headset(app, complain.clone())?;
-    let headset = client.headset();
-    if let (Some([width, height]), Some(offers)) = (headset.eye_size(), headset.offers()) {
-        tracing::info!("headset: {width}x{height} pixels an eye, {offers:?}");
+    // Whether decoded pictures go through memory, because the GPU cannot reach them.
+    let in_memory = Arc::<AtomicBool>::default();
+    let mut client = open_headset(app, Arc::clone(&in_memory))?;
+    if let Some(headset) = client.headset().description() {
+        tracing::info!("headset: {headset}");
     }
     let mut look_at = client.clock().now();
     let mut pause = Duration::ZERO;
@@ -61,12 +60,9 @@ pub(crate) fn run(app: &AndroidApp) -> Result<()> {
         let now = client.clock().now();
         if client.network().is_none() && now >= look_at {
             look_at = ClientTime(now.0 + LOOK_AGAIN.as_nanos() as u64);
-            reach_server(app, &mut client, &complain)?;
+            reach_server(app, &mut client, &in_memory)?;
         }
-        for complaint in complaints.try_iter() {
-            tracing::error!("{complaint}");
-            client.say(Some(complaint));
-        }
+        client.set_paused(activity.is_paused);
         pause = match client.turn(&mut hear)? {
             Turn::Frame(_) => Duration::ZERO,
             Turn::Idle | Turn::Lost => openxr::IDLE,
@@ -79,6 +75,7 @@ pub(crate) fn run(app: &AndroidApp) -> Result<()> {
 #[derive(Debug, Default)]
 struct Activity {
     was_resumed: bool,
+    is_paused: bool,
     is_destroyed: bool,
 }
 
@@ -93,8 +90,12 @@ impl Activity {
                 MainEvent::Resume { .. } => {
                     tracing::info!("resumed");
                     self.was_resumed = true;
+                    self.is_paused = false;
                 }
-                MainEvent::Pause => tracing::info!("paused"),
+                MainEvent::Pause => {
+                    tracing::info!("paused");
+                    self.is_paused = true;
+                }
                 MainEvent::InitWindow { .. } => tracing::info!("a window is there"),
                 MainEvent::TerminateWindow { .. } => tracing::info!("the window is gone"),
                 MainEvent::LowMemory => tracing::warn!("the device is short of memory"),
@@ -108,7 +109,7 @@ impl Activity {
     }
 }
 
-fn open_headset(app: &AndroidApp, complain: Sender<String>) -> Result<AndroidClient> {
+fn open_headset(app: &AndroidApp, in_memory: Arc<AtomicBool>) -> Result<AndroidClient> {
     // SAFETY: machine and activity are valid as long as `app`, which outlives the
     // headset.
     let platform = unsafe { AndroidPlatformInfo::new(app.vm_as_ptr(), app.activity_as_ptr()) };
@@ -121,9 +122,10 @@ fn open_headset(app: &AndroidApp, complain: Sender<String>) -> Result<AndroidCli
             ycbcr: true,
         },
         on_device: Some(Box::new(move |vulkan, renderer| {
-            if let Err(error) = reach_pictures(vulkan, renderer) {
-                // The receiver lives as long as the headset.
-                let _ = complain.send(format!("No picture can be shown: {error:#}"));
+            let reached = reach_pictures(vulkan, renderer);
+            in_memory.store(reached.is_err(), Relaxed);
+            if let Err(error) = reached {
+                tracing::warn!("decoded pictures go through memory: {error:#}");
             }
         })),
         ..HeadsetConfig::default()
@@ -146,7 +148,7 @@ fn reach_pictures(vulkan: &VulkanGpu, renderer: &mut Renderer) -> Result<()> {
 fn reach_server(
     app: &AndroidApp,
     client: &mut AndroidClient,
-    complain: &Sender<String>,
+    in_memory: &Arc<AtomicBool>,
 ) -> Result<()> {
     let line = match settings::find(app) {
         Ok(line) => line,
@@ -157,13 +159,8 @@ fn reach_server(
     };
     tracing::info!("server {}", line.address);
     client.say(None);
-    let complain = complain.clone();
-    let decoder = PlatformDecoder::new(move |size| {
-        Codec::open(size).inspect_err(|error| {
-            // Nobody listens only while everything ends.
-            let _ = complain.send(error.to_string());
-        })
-    });
+    let in_memory = Arc::clone(in_memory);
+    let decoder = PlatformDecoder::new(move |size| Codec::open(size, in_memory.load(Relaxed)));
     Ok(client.connect(line, decoder, MAX_ATLAS_SIDE)?)
 }
 

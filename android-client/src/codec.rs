@@ -1,7 +1,7 @@
 //! MediaCodec as a codec of the platform: units go in under their stamps as
 //! presentation times, pictures come out of an ImageReader's queue, where they
-//! stay on the GPU. Nothing here waits, but for the moment in which a picture
-//! that was announced is finished.
+//! stay on the GPU, or are copied from where the processor reads them. Nothing here
+//! waits, but for the moment in which a picture that was announced is finished.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -14,7 +14,9 @@ use ndk::media::media_codec::{
 };
 use ndk::media::media_format::MediaFormat;
 use ndk::media_error::MediaError;
-use shadecast_client::{DecodeError, DecodedPicture, ForeignPicture, PlatformCodec};
+use shadecast_client::{
+    DecodeError, DecodedPicture, ForeignPicture, PlatformCodec, StridedPlane, YuvPicture,
+};
 
 const H264: &str = "video/avc";
 
@@ -36,6 +38,7 @@ const KEY_FRAME: u32 = 1;
 pub(crate) struct Codec {
     codec: MediaCodec,
     reader: Arc<Reader>,
+    is_in_memory: bool,
 }
 
 /// A queue of pictures. Deleting it takes back all its pictures, so that each
@@ -67,17 +70,19 @@ impl HeldImage {
 }
 
 impl Codec {
-    /// Starts a decoder of H.264 for pictures of a width and a height.
-    pub(crate) fn open(size: [u16; 2]) -> Result<Self, DecodeError> {
+    /// Starts a decoder of H.264 for pictures of a width and a height, which stay on
+    /// the GPU or come through memory.
+    pub(crate) fn open(size: [u16; 2], is_in_memory: bool) -> Result<Self, DecodeError> {
         let [width, height] = size.map(i32::from);
-        let reader = ImageReader::new_with_usage(
-            width,
-            height,
-            ImageFormat::PRIVATE,
-            HardwareBufferUsage::GPU_SAMPLED_IMAGE,
-            MOST_PICTURES,
-        )
-        .map_err(unavailable("no queue for its pictures"))?;
+        let (format, usage) = if is_in_memory {
+            let read = HardwareBufferUsage::CPU_READ_OFTEN;
+            (ImageFormat::YUV_420_888, read)
+        } else {
+            let sampled = HardwareBufferUsage::GPU_SAMPLED_IMAGE;
+            (ImageFormat::PRIVATE, sampled)
+        };
+        let reader = ImageReader::new_with_usage(width, height, format, usage, MOST_PICTURES)
+            .map_err(unavailable("no queue for its pictures"))?;
         let started = start(&reader, [width, height], true).or_else(|error| {
             tracing::info!("the decoder does not start with low latency: {error}");
             start(&reader, [width, height], false)
@@ -88,6 +93,7 @@ impl Codec {
         Ok(Self {
             codec,
             reader: Arc::new(Reader(reader)),
+            is_in_memory,
         })
     }
 
@@ -106,27 +112,55 @@ impl Codec {
         }
     }
 
-    fn picture(&self, image: Image) -> Result<(u64, DecodedPicture), MediaError> {
-        let nanoseconds = u64::try_from(image.timestamp()?).unwrap_or_default();
-        // To the nearest, whatever the codec's own clock rounds to.
-        let stamp = (nanoseconds / 1000 + STEP / 2) / STEP;
-        let crop = image.crop_rect()?;
-        let size = if crop.right > crop.left && crop.bottom > crop.top {
-            // One that does not begin in the corner is no stream of ours; what it
-            // shows is wrong then, and the size tells.
-            [crop.right, crop.bottom]
-        } else {
-            [image.width()?, image.height()?]
-        };
-        let picture = ForeignPicture {
-            size: size.map(|side| u32::try_from(side).unwrap_or_default()),
-            image: Arc::new(HeldImage {
-                image,
-                _reader: Arc::clone(&self.reader),
-            }),
-        };
+    fn picture(&self, image: Image) -> Result<(u64, DecodedPicture), DecodeError> {
+        let (stamp, size) = stamp_and_size(&image).map_err(broken)?;
+        if self.is_in_memory {
+            let copied = copy(&image, size).map_err(broken)?;
+            let message = "a plane is smaller than the picture";
+            let picture = copied.ok_or_else(|| DecodeError::Refused(message.into()))?;
+            return Ok((stamp, picture.into()));
+        }
+        let image = Arc::new(HeldImage {
+            image,
+            _reader: Arc::clone(&self.reader),
+        });
+        let picture = ForeignPicture { size, image };
         Ok((stamp, DecodedPicture::Foreign(picture)))
     }
+}
+
+fn stamp_and_size(image: &Image) -> Result<(u64, [u32; 2]), MediaError> {
+    let nanoseconds = u64::try_from(image.timestamp()?).unwrap_or_default();
+    // To the nearest, whatever the codec's own clock rounds to.
+    let stamp = (nanoseconds / 1000 + STEP / 2) / STEP;
+    let crop = image.crop_rect()?;
+    let size = if crop.right > crop.left && crop.bottom > crop.top {
+        // One that does not begin in the corner is no stream of ours; what it
+        // shows is wrong then, and the size tells.
+        [crop.right, crop.bottom]
+    } else {
+        [image.width()?, image.height()?]
+    };
+    Ok((
+        stamp,
+        size.map(|side| u32::try_from(side).unwrap_or_default()),
+    ))
+}
+
+/// The picture in a buffer that the processor reads.
+fn copy(image: &Image, size: [u32; 2]) -> Result<Option<YuvPicture>, MediaError> {
+    let plane = |index| -> Result<StridedPlane<'_>, MediaError> {
+        Ok(StridedPlane {
+            bytes: image.plane_data(index)?,
+            // What is negative is larger than any plane.
+            row_stride: image.plane_row_stride(index)? as usize,
+            texel_stride: image.plane_pixel_stride(index)? as usize,
+        })
+    };
+    Ok(YuvPicture::of_planes(
+        size,
+        [plane(0)?, plane(1)?, plane(2)?],
+    ))
 }
 
 fn start(
@@ -197,7 +231,7 @@ impl PlatformCodec for Codec {
     fn take(&mut self) -> Result<Option<(u64, DecodedPicture)>, DecodeError> {
         self.forward().map_err(broken)?;
         match self.reader.0.acquire_next_image().map_err(broken)? {
-            AcquireResult::Image(image) => self.picture(image).map(Some).map_err(broken),
+            AcquireResult::Image(image) => self.picture(image).map(Some),
             // Those that are held come back, and the codec waits meanwhile.
             AcquireResult::NoBufferAvailable | AcquireResult::MaxImagesAcquired => Ok(None),
         }

@@ -11,6 +11,7 @@
 mod conformance;
 #[cfg(feature = "openh264")]
 mod openh264;
+mod planes;
 mod platform;
 mod thread;
 
@@ -21,6 +22,7 @@ use crate::DecodedPicture;
 
 #[cfg(feature = "openh264")]
 pub use self::openh264::OpenH264Decoder;
+pub use planes::StridedPlane;
 pub use platform::{PlatformCodec, PlatformDecoder};
 pub use thread::{DecoderGone, DecoderThread};
 

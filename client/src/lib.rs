@@ -24,7 +24,7 @@ pub use clock::ClockEstimate;
 pub use decode::OpenH264Decoder;
 pub use decode::{
     AccessUnit, DecodeError, Decoded, Decoder, DecoderGone, DecoderThread, PlatformCodec,
-    PlatformDecoder, Ticket,
+    PlatformDecoder, StridedPlane, Ticket,
 };
 pub use frame::{
     ClientFrame, ClientTiming, DecodedPicture, DrawVertex, ForeignPicture, MaskAtlas, YuvPicture,

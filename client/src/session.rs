@@ -9,6 +9,9 @@
 //!     +---- back off -----+---------------+-------------------+    -> Ended
 //! ```
 //!
+//! While its user looks away the session rests: it leaves the server, which has
+//! nothing to compute then, and comes back when it is woken.
+//!
 //! What runs it does as the outputs say, answers every [`Output::Connect`] with
 //! [`Input::Connected`] or [`Input::Disconnected`], and gives no input of an old
 //! connection after its [`Output::Disconnect`]. It drains the outputs after
@@ -74,6 +77,8 @@ enum State {
     Greeting { since: ClientTime },
     /// The server sends frames.
     Streaming(Box<Connection>),
+    /// Until it is woken.
+    Resting,
     /// Failed for good, or left.
     Ended,
 }
@@ -116,6 +121,8 @@ impl Session {
             Input::View(view) => self.handle_view(view),
             Input::Drawn(drawn) => self.handle_drawn(&drawn),
             Input::Disconnected(reason) => self.handle_disconnected(now, reason),
+            Input::Rest => self.rest(),
+            Input::Wake => self.wake(now),
             Input::Leave => self.leave(),
             Input::Tick => {}
         }
@@ -147,7 +154,7 @@ impl Session {
 
     fn handle_message(&mut self, now: ClientTime, message: ToClient) {
         match (&mut self.state, message) {
-            (State::Waiting { .. } | State::Connecting | State::Ended, _) => {}
+            (State::Waiting { .. } | State::Connecting | State::Resting | State::Ended, _) => {}
             (State::Greeting { .. }, ToClient::Welcome(welcome)) => self.enter(now, welcome),
             (State::Greeting { .. }, ToClient::Refused(refusal)) => self.be_refused(now, refusal),
             (State::Greeting { .. } | State::Streaming(_), ToClient::Bye) => {
@@ -212,9 +219,16 @@ impl Session {
     }
 
     fn handle_decoded(&mut self, now: ClientTime, decoded: Decoded) {
-        if let State::Streaming(connection) = &mut self.state {
-            connection.stream.take_decoded(now, decoded);
-            self.advance(now);
+        let State::Streaming(connection) = &mut self.state else {
+            return;
+        };
+        match connection.stream.take_decoded(now, decoded) {
+            Ok(()) => self.advance(now),
+            Err(error) => {
+                self.outputs
+                    .push_back(Output::Disconnect("the client has no decoder".into()));
+                self.fail(Failure::Decoder(error));
+            }
         }
     }
 
@@ -258,7 +272,10 @@ impl Session {
     }
 
     fn handle_disconnected(&mut self, now: ClientTime, reason: Disconnection) {
-        if matches!(self.state, State::Waiting { .. } | State::Ended) {
+        if matches!(
+            self.state,
+            State::Waiting { .. } | State::Resting | State::Ended
+        ) {
             return;
         }
         match reason {
@@ -272,19 +289,37 @@ impl Session {
     }
 
     fn leave(&mut self) {
-        match self.state {
-            State::Greeting { .. } | State::Streaming(_) => {
-                self.outputs.push_back(Output::Send(ToServer::Bye));
-                let reason = "the client leaves".into();
-                self.outputs.push_back(Output::Disconnect(reason));
-            }
-            State::Connecting => {
-                let reason = "the client leaves".into();
-                self.outputs.push_back(Output::Disconnect(reason));
-            }
-            State::Waiting { .. } | State::Ended => {}
-        }
+        self.take_leave("the client leaves");
         self.state = State::Ended;
+    }
+
+    fn rest(&mut self) {
+        if matches!(self.state, State::Resting | State::Ended) {
+            return;
+        }
+        self.take_leave("the client rests");
+        self.state = State::Resting;
+        self.outputs.push_back(Output::Status(Status::Resting));
+    }
+
+    fn wake(&mut self, now: ClientTime) {
+        if matches!(self.state, State::Resting) {
+            self.backoff = BACKOFF_MIN;
+            self.state = State::Waiting { until: now };
+        }
+    }
+
+    /// Tells a server that is there, and closes the connection.
+    fn take_leave(&mut self, reason: &str) {
+        if matches!(self.state, State::Greeting { .. } | State::Streaming(_)) {
+            self.outputs.push_back(Output::Send(ToServer::Bye));
+        }
+        match self.state {
+            State::Connecting | State::Greeting { .. } | State::Streaming(_) => {
+                self.outputs.push_back(Output::Disconnect(reason.into()));
+            }
+            State::Waiting { .. } | State::Resting | State::Ended => {}
+        }
     }
 
     /// Lets the stream decode and present what it can.

@@ -27,7 +27,9 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         MAX_ATLAS_SIDE as u16,
     )?;
     let interrupt = Interrupt::watch()?;
-    describe(&client);
+    if let Some(headset) = client.headset().description() {
+        eprintln!("headset: {headset}");
+    }
     let mut pace = Pace::default();
     loop {
         let before = ThreadTime::now();
@@ -56,26 +58,6 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-fn describe(client: &HeadsetClient) {
-    let headset = client.headset();
-    if let (Some(vulkan), Some([width, height]), Some(offers)) =
-        (headset.vulkan(), headset.eye_size(), headset.offers())
-    {
-        let left_out: Vec<_> = offers.left_out().collect();
-        eprintln!(
-            "headset: 2x{width}x{height}, {}, {}{}{}",
-            vulkan.gpu.adapter.get_info().name,
-            vulkan.gpu.stereo.name(),
-            if left_out.is_empty() {
-                ""
-            } else {
-                ", without "
-            },
-            left_out.join(", "),
-        );
-    }
-}
-
 fn hear(event: &Event) {
     let Event::Status(status) = event else { return };
     match status {
@@ -83,6 +65,7 @@ fn hear(event: &Event) {
         Status::Filling => eprintln!("waiting for the first picture"),
         Status::Streaming => eprintln!("streaming"),
         Status::Recovering(_) => eprintln!("recovering"),
+        Status::Resting => eprintln!("resting until the headset is worn"),
         Status::Reconnecting { reason, after } => {
             eprintln!("{reason}; again in {:.1} s", after.as_secs_f64());
         }

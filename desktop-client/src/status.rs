@@ -54,6 +54,7 @@ impl StatusLine {
             Status::Filling => "waiting for the first picture".into(),
             Status::Streaming => "streaming".into(),
             Status::Recovering(_) => "recovering".into(),
+            Status::Resting => "resting".into(),
             Status::Reconnecting { reason, after } => {
                 format!("{reason}; again in {:.1} s", after.as_secs_f64())
             }

@@ -274,7 +274,10 @@ mod tests {
             assert_eq!(method.to_string().parse(), Ok(method));
         }
         let unknown = "quadtree".parse::<Method>().unwrap_err();
-        assert_eq!(unknown.to_string(), "a method is expected: sas or tss");
+        assert_eq!(
+            unknown.to_string(),
+            "a method is expected: sas or tss or snake"
+        );
     }
 
     #[test]

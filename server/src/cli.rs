@@ -158,8 +158,8 @@ pub(crate) struct ServeArguments {
     /// Factor from radiance to displayed brightness [default: measured when the scene is loaded]
     #[arg(long, value_parser = positive)]
     pub(crate) exposure: Option<f64>,
-    /// Most heads that are predicted while an update is on display: one each 33 ms, as latency and rate are measured
-    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=8))]
+    /// Most heads that are predicted while an update is on display: one each 33 ms, as latency and rate are measured; each is two more pictures to draw
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u32).range(1..=8))]
     pub(crate) head_samples: u32,
     /// File with certificate and secret, made where it does not exist; a server restarted with it keeps its line
     #[arg(long)]

@@ -32,6 +32,6 @@ pub mod kernels {
 pub use frame::{Frame, FrameError, FrameOrder, FrameStats, Pipeline, Stages};
 pub use gpu::{Gpu, GpuError, GpuScene, Integrator};
 pub use prediction::Prediction;
-pub use session::{Input, Output, Session, SessionConfig};
+pub use session::{Hands, Input, Output, Session, SessionConfig};
 pub use shadecast_shaders::picture::displayed as tone_map;
 pub use visibility::Visibility;

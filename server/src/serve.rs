@@ -199,8 +199,10 @@ impl Server<'_> {
                         .handle_input(Input::FrameMade(Box::new(frame)));
                     self.speed = client.session.speed();
                     self.stats.sent(client.connection.sent_bytes());
-                    self.status
-                        .live(|| self.stats.line(client.session.latency()));
+                    self.status.live(|| {
+                        self.stats
+                            .line(client.session.latency(), &client.session.hands())
+                    });
                 }
                 Err(error) => {
                     self.stats.failures += 1;
@@ -236,9 +238,13 @@ impl Server<'_> {
             } => {
                 let clients = self.strangers.iter_mut().chain(&mut self.client);
                 if let Some(client) = clients.into_iter().find(|c| c.connection.id == id) {
+                    let before = client.session.hands();
                     client
                         .session
                         .handle_input(Input::Message { received, message });
+                    for line in self.stats.pressed(&before, &client.session.hands()) {
+                        self.status.print(&line);
+                    }
                 }
                 self.flush();
                 return self.admit();

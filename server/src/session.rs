@@ -4,6 +4,7 @@
 //! The session knows who may connect, where the head was last seen, how long
 //! an update takes to be seen, and when the next frame is worth making.
 
+mod hands;
 #[cfg(test)]
 mod tests;
 
@@ -18,6 +19,8 @@ use crate::{
     frame::{Frame, FrameOrder},
     prediction::{HeadFilter, Latency, Prediction},
 };
+
+pub use hands::Hands;
 
 /// Weight of a new measurement of the light stage's speed.
 const SPEED_WEIGHT: f64 = 0.3;
@@ -91,6 +94,7 @@ struct Stream {
     new_client: bool,
     reset: bool,
     latency: Latency,
+    hands: Hands,
 }
 
 /// What the client said of its head.
@@ -141,6 +145,15 @@ impl Session {
         match &self.state {
             State::Streaming(stream) => stream.latency.motion_to_photon(),
             _ => None,
+        }
+    }
+
+    /// What the client's controllers do.
+    #[must_use]
+    pub fn hands(&self) -> Hands {
+        match &self.state {
+            State::Streaming(stream) => stream.hands,
+            _ => Hands::default(),
         }
     }
 
@@ -227,12 +240,14 @@ impl Session {
                 self.close("it said hello twice".to_owned())
             }
             (State::Streaming(stream), ToServer::View(view)) => {
-                let heard = stream.heard.get_or_insert_with(|| Heard {
-                    received,
-                    view,
-                    filter: HeadFilter::new(&view),
-                });
-                if view.seq > heard.view.seq {
+                let known = stream.heard.as_ref().map(|heard| heard.view.seq);
+                if known.is_none_or(|known| view.seq > known) {
+                    stream.hands.take(view.hands);
+                    let heard = stream.heard.get_or_insert_with(|| Heard {
+                        received,
+                        view,
+                        filter: HeadFilter::new(&view),
+                    });
                     heard.filter.tell(&view);
                     (heard.received, heard.view) = (received, view);
                 }
@@ -272,6 +287,7 @@ impl Session {
             new_client: true,
             reset: true,
             latency: Latency::new(self.config.frame_period),
+            hands: Hands::default(),
         }));
     }
 

@@ -50,9 +50,24 @@ fn triangles_by_themselves_take_the_same_way() {
 fn runs_are_the_same(first: &Loopback, second: &Loopback) {
     assert_eq!(first.sent().len(), second.sent().len());
     for (index, (one, other)) in first.sent().iter().zip(second.sent()).enumerate() {
-        let message = ToClient::decode(one).expect("a message");
-        assert!(one == other, "message {index} differs: {message:?}");
+        assert!(
+            one == other,
+            "message {index} differs: {}",
+            first_difference(one, other)
+        );
     }
+}
+
+/// Where two messages begin to differ, for whoever looks for the cause.
+fn first_difference(one: &[u8], other: &[u8]) -> String {
+    let at = one.iter().zip(other).take_while(|(a, b)| a == b).count();
+    let what = match ToClient::decode(one).expect("a message") {
+        ToClient::Update(update) => format!("the update of {:?}", update.frame),
+        ToClient::Picture(picture) => format!("the picture of {:?}", picture.frame),
+        other => format!("{other:?}"),
+    };
+    let lengths = [one.len(), other.len()];
+    format!("{what}, from byte {at} of {lengths:?} on")
 }
 
 #[test]

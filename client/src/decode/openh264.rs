@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 use openh264::decoder::{DecodedYUV, Decoder as OpenH264};
 use openh264::formats::YUVSource;
 
-use super::{AccessUnit, DecodeError, Decoded, Decoder};
+use super::{AccessUnit, DecodeError, Decoded, Decoder, StridedPlane};
 use crate::YuvPicture;
 
 /// Decodes on the thread that calls it.
@@ -80,22 +80,18 @@ fn tight_picture(picture: &DecodedYUV<'_>, expected: [u32; 2]) -> Result<YuvPict
         return Err(DecodeError::Size { expected, found });
     }
     let (y_stride, u_stride, v_stride) = picture.strides();
-    let half = [width / 2, height / 2];
-    Ok(YuvPicture {
-        width: found[0],
-        height: found[1],
-        y: tight_plane(picture.y(), y_stride, [width, height]),
-        u: tight_plane(picture.u(), u_stride, half),
-        v: tight_plane(picture.v(), v_stride, half),
-    })
-}
-
-fn tight_plane(plane: &[u8], stride: usize, [width, height]: [usize; 2]) -> Vec<u8> {
-    let mut tight = Vec::with_capacity(width * height);
-    for row in plane.chunks(stride).take(height) {
-        tight.extend_from_slice(&row[..width]);
-    }
-    tight
+    let plane = |bytes, row_stride| StridedPlane {
+        bytes,
+        row_stride,
+        texel_stride: 1,
+    };
+    let planes = [
+        plane(picture.y(), y_stride),
+        plane(picture.u(), u_stride),
+        plane(picture.v(), v_stride),
+    ];
+    YuvPicture::of_planes(found, planes)
+        .ok_or_else(|| DecodeError::Refused("a plane is smaller than the picture".into()))
 }
 
 #[cfg(test)]

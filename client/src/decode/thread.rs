@@ -1,7 +1,9 @@
 //! A decoder on a thread of its own, so that neither network nor drawing waits
 //! for it.
 
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{
+    Receiver, RecvTimeoutError, Sender, SyncSender, TrySendError, channel, sync_channel,
+};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -18,10 +20,15 @@ const POLL_INTERVAL: Duration = Duration::from_millis(1);
 
 /// The decoder's thread has ended, or takes nothing any more. The session is
 /// told with [`DecodeError::Unavailable`](crate::DecodeError::Unavailable) for
-/// the unit, and a new thread is started.
+/// the unit; it asks for a few new starts, for which a thread that merely hung may
+/// be back, and then it is over.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 #[error("the video decoder has stopped working")]
 pub struct DecoderGone;
+
+/// How long a thread is waited for that should end. One that hangs in a codec of the
+/// platform is left behind: whoever leaves shall not hang with it.
+const FAREWELL: Duration = Duration::from_secs(1);
 
 /// Runs a [`Decoder`]. Dropping it ends the thread after the unit at hand.
 #[derive(Debug)]
@@ -29,12 +36,14 @@ pub struct DecoderThread {
     /// None only while dropping.
     units: Option<SyncSender<AccessUnit>>,
     thread: Option<JoinHandle<()>>,
+    /// Its other end goes when the thread ends.
+    ended: Receiver<()>,
 }
 
 impl DecoderThread {
     /// Starts the thread. It calls `on_decoded` for every unit, in order, as far
-    /// as the decoder answers; units that a restart overtakes are left out. `on_decoded` usually sends
-    /// into the channel from which the session is fed.
+    /// as the decoder answers; units that a restart overtakes are left out.
+    /// `on_decoded` usually sends into the channel from which the session is fed.
     ///
     /// # Errors
     /// The system gives no thread.
@@ -43,12 +52,17 @@ impl DecoderThread {
         on_decoded: impl FnMut(Decoded) + Send + 'static,
     ) -> std::io::Result<Self> {
         let (units, waiting) = sync_channel(QUEUED_UNITS);
+        let (alive, ended) = channel();
         let thread = std::thread::Builder::new()
             .name("decoder".into())
-            .spawn(move || run(decoder, &waiting, on_decoded))?;
+            .spawn(move || {
+                let _alive: Sender<()> = alive;
+                run(decoder, &waiting, on_decoded);
+            })?;
         Ok(Self {
             units: Some(units),
             thread: Some(thread),
+            ended,
         })
     }
 
@@ -67,9 +81,12 @@ impl DecoderThread {
 impl Drop for DecoderThread {
     fn drop(&mut self) {
         self.units = None;
-        if let Some(thread) = self.thread.take()
-            && thread.join().is_err()
-        {
+        let Some(thread) = self.thread.take() else {
+            return;
+        };
+        if self.ended.recv_timeout(FAREWELL) == Err(RecvTimeoutError::Timeout) {
+            tracing::error!("the decoder hangs and is left behind");
+        } else if thread.join().is_err() {
             tracing::error!("the decoder's thread panicked");
         }
     }
@@ -110,7 +127,7 @@ fn run(
 #[cfg(test)]
 mod tests {
     use std::collections::VecDeque;
-    use std::sync::mpsc::channel;
+    use std::time::Instant;
 
     use shadecast_protocol::FrameId;
 
@@ -182,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_decoder_that_hangs_does_not_hang_its_caller() {
+    fn a_decoder_that_hangs_does_not_hang_its_caller_nor_whoever_leaves() {
         let (release, held) = channel::<()>();
         let thread = DecoderThread::spawn(SlowDecoder::default(), move |_| {
             // Ends when the test drops `release`.
@@ -191,6 +208,9 @@ mod tests {
         .unwrap();
         let sent = (0..100).find(|&frame| thread.send(unit(frame, &[])) == Err(DecoderGone));
         assert!(sent.is_some_and(|frame| frame >= QUEUED_UNITS as u32));
+        let began = Instant::now();
+        drop(thread);
+        assert!(began.elapsed() < 10 * FAREWELL);
         drop(release);
     }
 }

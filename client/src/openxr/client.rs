@@ -11,8 +11,11 @@ use thiserror::Error;
 use super::{Headset, HeadsetConfig, HeadsetError, Turn};
 use crate::network::{Event, Network};
 use crate::render::{FrameSender, frame_channel};
-use crate::{Clock, Decoder, Failure};
+use crate::{Clock, Decoder, Failure, Input};
 
+/// A headset that wants no pictures for this long is not worn, and the server is
+/// left: it has nothing to compute then. A glance at one's watch is shorter.
+const REST_AFTER: Duration = Duration::from_secs(10);
 /// How long a final sentence stays before the eyes.
 const READING: Duration = Duration::from_secs(8);
 /// How long a runtime is given to let the user leave.
@@ -40,6 +43,12 @@ pub struct HeadsetClient<P = ()> {
     /// The network's end of the hand-over, until it has it.
     frames: Option<FrameSender>,
     clock: Clock,
+    /// By whoever runs the client.
+    is_paused: bool,
+    /// Since when the headset wants no pictures.
+    idle_since: Option<ClientTime>,
+    /// Whether the session with the server rests.
+    rests: bool,
     /// Since when a failure is shown.
     failed: Option<(ClientTime, Failure)>,
     /// Since when the runtime is asked to let the user leave.
@@ -80,6 +89,9 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
             network: None,
             frames: Some(sender),
             clock: Clock::start(),
+            is_paused: false,
+            idle_since: None,
+            rests: false,
             failed: None,
             leaving: None,
         })
@@ -114,6 +126,12 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
             .say(sentence.map(|sentence| capitalised(&sentence)));
     }
 
+    /// While it is paused, the client has left its server, and keeps the world. It
+    /// does so by itself while the headset is not worn.
+    pub fn set_paused(&mut self, is_paused: bool) {
+        self.is_paused = is_paused;
+    }
+
     /// A turn of the headset ([`Headset::turn`]); `hear` is told what the
     /// network's thread says.
     ///
@@ -134,11 +152,9 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
             }
         }
         let now = self.clock.now();
-        let is_over = |since: ClientTime, time: Duration| {
-            u128::from(now.0.saturating_sub(since.0)) >= time.as_nanos()
-        };
+        self.rest_or_wake(now);
         if let Some((since, _)) = &self.failed
-            && is_over(*since, READING)
+            && is_over(*since, now, READING)
         {
             self.leave()?;
         }
@@ -149,11 +165,10 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
                 network.tell(input);
             }
         })?;
-        if let Some(since) = self.leaving {
-            let is_shown = self.headset.life().is_some_and(|life| life.is_running());
-            if is_over(since, LEAVING) || !is_shown && turn == Turn::Idle {
-                turn = Turn::Exit;
-            }
+        if let Some(since) = self.leaving
+            && (is_over(since, now, LEAVING) || !self.is_shown() && turn == Turn::Idle)
+        {
+            turn = Turn::Exit;
         }
         if turn == Turn::Exit
             && let Some((_, failure)) = self.failed.take()
@@ -163,6 +178,27 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
         Ok(turn)
     }
 
+    /// Lets the session with the server rest while nobody looks.
+    fn rest_or_wake(&mut self, now: ClientTime) {
+        self.idle_since = match self.idle_since {
+            _ if self.is_shown() => None,
+            since => since.or(Some(now)),
+        };
+        let is_off = |since| is_over(since, now, REST_AFTER);
+        let rests = self.is_paused || self.idle_since.is_some_and(is_off);
+        if let Some(network) = &self.network
+            && rests != self.rests
+        {
+            network.tell(if rests { Input::Rest } else { Input::Wake });
+            self.rests = rests;
+        }
+    }
+
+    /// Whether the runtime wants pictures.
+    fn is_shown(&self) -> bool {
+        self.headset.life().is_some_and(|life| life.is_running())
+    }
+
     /// Asks the runtime to let the user leave; a later turn is [`Turn::Exit`].
     ///
     /// # Errors
@@ -170,7 +206,7 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
     pub fn leave(&mut self) -> Result<(), HeadsetError> {
         if self.leaving.is_none() {
             self.leaving = Some(self.clock.now());
-            if self.headset.life().is_some_and(|life| life.is_running()) {
+            if self.is_shown() {
                 self.headset.request_exit()?;
             }
         }
@@ -194,6 +230,10 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
     pub fn clock(&self) -> Clock {
         self.clock
     }
+}
+
+fn is_over(since: ClientTime, now: ClientTime, time: Duration) -> bool {
+    u128::from(now.0.saturating_sub(since.0)) >= time.as_nanos()
 }
 
 /// As a sentence begins.

@@ -17,7 +17,7 @@ struct Profile {
 }
 
 /// The first is one that every runtime maps its controllers to.
-const PROFILES: [Profile; 3] = [
+const PROFILES: [Profile; 4] = [
     Profile {
         path: "/interaction_profiles/khr/simple_controller",
         button: "select/click",
@@ -30,6 +30,11 @@ const PROFILES: [Profile; 3] = [
     },
     Profile {
         path: "/interaction_profiles/valve/index_controller",
+        button: "trigger/click",
+        stick: Some("thumbstick"),
+    },
+    Profile {
+        path: "/interaction_profiles/bytedance/pico4_controller",
         button: "trigger/click",
         stick: Some("thumbstick"),
     },

@@ -203,6 +203,12 @@ impl<P: xr::PlatformInfo> Headset<P> {
         self.session.as_ref().map(RuntimeSession::offers)
     }
 
+    /// What was opened, in a line for people; none while the session is lost.
+    #[must_use]
+    pub fn description(&self) -> Option<String> {
+        self.session.as_ref().map(RuntimeSession::description)
+    }
+
     /// Pixels of one eye's picture; none while the session is lost.
     #[must_use]
     pub fn eye_size(&self) -> Option<[u32; 2]> {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use shadecast_protocol::{ClientTime, Pose, Sky, Welcome};
 
-use crate::render::FrameReceiver;
+use crate::render::{FrameReceiver, UploadError};
 use crate::{ClientFrame, Status};
 
 /// A network that brings nothing for this long has stalled, and the user is told.
@@ -26,9 +26,13 @@ pub(super) struct Held {
     pub(super) world_from_play: Pose,
     /// When something last came, or was first waited for.
     heard_at: Option<ClientTime>,
+    /// When it was last asked for something new.
+    asked_at: Option<ClientTime>,
     status: &'static str,
     /// Said by whoever runs the headset, and shown until it is taken back.
     said: Option<String>,
+    /// Why the newest frame is not shown.
+    unshown: Option<String>,
 }
 
 impl Held {
@@ -41,8 +45,10 @@ impl Held {
             home: None,
             world_from_play: Pose::IDENTITY,
             heard_at: None,
+            asked_at: None,
             status: "Connecting to the server",
             said: None,
+            unshown: None,
         }
     }
 
@@ -61,9 +67,20 @@ impl Held {
         self.said = sentence;
     }
 
+    /// The newest frame was taken over, or could not be; the log hears of it once.
+    pub(super) fn tell_upload(&mut self, uploaded: Result<(), UploadError>) {
+        let why = uploaded.err().map(|error| error.to_string());
+        if let Some(why) = &why
+            && self.unshown.as_ref() != Some(why)
+        {
+            tracing::warn!("a frame is not shown: {why}");
+        }
+        self.unshown = why;
+    }
+
     pub(super) fn take_status(&mut self, status: &Status) {
         self.status = match status {
-            Status::Connecting => "Connecting to the server",
+            Status::Connecting | Status::Resting => "Connecting to the server",
             Status::Filling | Status::Recovering(_) | Status::Streaming => {
                 "Waiting for pictures from the server"
             }
@@ -73,7 +90,14 @@ impl Held {
 
     /// What is to be shown instead of `shown`, if something came.
     pub(super) fn take_newest(&mut self, now: ClientTime) -> Option<Arc<ClientFrame>> {
-        self.heard_at.get_or_insert(now);
+        // Nobody looked for a while, and so nothing has stalled.
+        let looked_away = self
+            .asked_at
+            .replace(now)
+            .is_none_or(|before| is_stall(before, now));
+        if looked_away {
+            self.heard_at = Some(now);
+        }
         let frame = self.frames.take_newest()?;
         self.heard_at = Some(now);
         Some(frame)
@@ -84,9 +108,15 @@ impl Held {
         if let Some(said) = &self.said {
             return Some(said);
         }
-        let since = now.0.saturating_sub(self.heard_at?.0);
-        (since > STALL.as_nanos() as u64).then_some(self.status)
+        if let Some(why) = &self.unshown {
+            return Some(why);
+        }
+        is_stall(self.heard_at?, now).then_some(self.status)
     }
+}
+
+fn is_stall(since: ClientTime, now: ClientTime) -> bool {
+    now.0.saturating_sub(since.0) > STALL.as_nanos() as u64
 }
 
 #[cfg(test)]
@@ -138,7 +168,10 @@ mod tests {
         let at = |ms: u64| ClientTime(7_000_000_000 + ms * 1_000_000);
         assert_eq!(held.notice(at(0)), None, "nothing was waited for yet");
         assert!(held.take_newest(at(0)).is_none());
-        assert_eq!(held.notice(at(500)), None);
+        for ms in [100, 200, 300, 400, 500] {
+            assert!(held.take_newest(at(ms)).is_none());
+            assert_eq!(held.notice(at(ms)), None);
+        }
         assert_eq!(held.notice(at(501)), Some("Connecting to the server"));
         let lost = Status::Reconnecting {
             reason: "gone".into(),
@@ -151,5 +184,16 @@ mod tests {
         );
         held.say(Some("The secret is wrong".into()));
         assert_eq!(held.notice(at(1)), Some("The secret is wrong"));
+    }
+
+    #[test]
+    fn whoever_puts_the_headset_on_again_is_not_told_of_a_stall_at_once() {
+        let (_sender, receiver) = frame_channel();
+        let mut held = Held::new(receiver);
+        let at = |ms: u64| ClientTime(ms * 1_000_000);
+        held.take_newest(at(0));
+        held.take_newest(at(60_000));
+        assert_eq!(held.notice(at(60_000)), None);
+        assert!(held.notice(at(60_501)).is_some());
     }
 }

@@ -70,6 +70,23 @@ impl RuntimeSession {
         self.color.size
     }
 
+    /// Depth has the size that is drawn, which is more than the pictures' where
+    /// they are antialiased: the compositor takes any.
+    pub(super) fn description(&self) -> String {
+        let [width, height] = self.color.size;
+        let gpu = &self.vulkan.gpu;
+        let depth = self.depth.as_ref().map_or(String::new(), |depth| {
+            let [width, height] = depth.size;
+            format!(", depth of {width}x{height}")
+        });
+        format!(
+            "2x{width}x{height}{depth}, {}, {}, {}",
+            gpu.adapter.get_info().name,
+            gpu.stereo.name(),
+            self.offers
+        )
+    }
+
     pub(super) fn life(&self) -> &LifeCycle {
         &self.life
     }
@@ -247,13 +264,12 @@ impl RuntimeSession {
         let lacking = || held.shown.clone().filter(|_| !self.is_current);
         if let Some(world) = newest.or_else(lacking) {
             let began = now();
-            match self.renderer.upload(&world) {
-                Ok(()) => {
-                    held.shown = Some(world);
-                    frame.fresh = has_newest;
-                }
-                Err(error) => tracing::warn!("a frame is not shown: {error}"),
+            let uploaded = self.renderer.upload(&world);
+            if uploaded.is_ok() {
+                held.shown = Some(world);
+                frame.fresh = has_newest;
             }
+            held.tell_upload(uploaded);
             frame.uploading = since(began, now());
         }
         if std::mem::take(&mut held.sky_is_new) || !self.is_current {

@@ -153,8 +153,8 @@ impl VulkanGpu {
             )
         });
         let demands = demands(stereo, &exposed.capabilities.limits);
-        if !exposed.features.contains(demands.required_features) {
-            return Err(VulkanError::Lacks("push constants or multiview"));
+        if let Some(lacking) = lacking(exposed.features, demands.required_features) {
+            return Err(VulkanError::Lacks(lacking));
         }
         let adapter = &exposed.adapter;
         let mut names = adapter.required_device_extensions(demands.required_features);
@@ -231,6 +231,21 @@ impl VulkanGpu {
             ycbcr,
         })
     }
+}
+
+/// What drawing needs and the device does not have, in words.
+fn lacking(has: wgpu::Features, needed: wgpu::Features) -> Option<&'static str> {
+    let names = [
+        (wgpu::Features::IMMEDIATES, "push constants"),
+        (
+            wgpu::Features::MULTIVIEW,
+            "multiview, in which it was asked to draw",
+        ),
+    ];
+    let lacks = |feature| needed.contains(feature) && !has.contains(feature);
+    names
+        .into_iter()
+        .find_map(|(feature, name)| lacks(feature).then_some(name))
 }
 
 fn open_instance(
@@ -339,5 +354,41 @@ unsafe impl VkHost for DirectHost {
         // SAFETY: the device is one of the instance, the description is whole.
         let device = unsafe { instance.create_device(physical, info, None) };
         Ok(device.map_err(refused("gave no device"))?.handle())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_device_without_multiview_draws_in_two_passes_or_says_so() {
+        let limits = wgpu::Limits {
+            max_multiview_view_count: 2,
+            ..wgpu::Limits::default()
+        };
+        let kind = wgpu::DeviceType::IntegratedGpu;
+        let all = wgpu::Features::IMMEDIATES | wgpu::Features::MULTIVIEW;
+        let without = wgpu::Features::IMMEDIATES;
+        assert_eq!(Stereo::of_device(all, &limits, kind), Stereo::Multiview);
+        assert_eq!(Stereo::of_device(without, &limits, kind), Stereo::TwoPass);
+        let one_view = wgpu::Limits::default();
+        assert_eq!(Stereo::of_device(all, &one_view, kind), Stereo::TwoPass);
+
+        let needed = |stereo| demands(stereo, &limits).required_features;
+        assert_eq!(lacking(without, needed(Stereo::TwoPass)), None);
+        assert_eq!(lacking(all, needed(Stereo::Multiview)), None);
+        let said = |has, stereo| {
+            let name = lacking(has, needed(stereo)).expect("it lacks something");
+            VulkanError::Lacks(name).to_string()
+        };
+        assert_eq!(
+            said(without, Stereo::Multiview),
+            "the GPU driver lacks multiview, in which it was asked to draw"
+        );
+        assert_eq!(
+            said(wgpu::Features::empty(), Stereo::TwoPass),
+            "the GPU driver lacks push constants"
+        );
     }
 }

@@ -9,7 +9,7 @@ use shadecast_protocol::{
 };
 use thiserror::Error;
 
-use crate::{AccessUnit, ClientFrame, Decoded, Drawn};
+use crate::{AccessUnit, ClientFrame, DecodeError, Decoded, Drawn};
 
 /// What happened.
 #[derive(Clone, Debug)]
@@ -26,6 +26,11 @@ pub enum Input {
     Drawn(Drawn),
     /// The connection was lost, or could not be made.
     Disconnected(Disconnection),
+    /// The user looks away: the server is left until [`Input::Wake`]. What is
+    /// shown stays.
+    Rest,
+    /// The user is back.
+    Wake,
     /// The user leaves.
     Leave,
     /// Time passed.
@@ -102,6 +107,8 @@ pub enum Status {
     Streaming,
     /// Pictures were lost; the last one stays until the server starts anew.
     Recovering(ResetReason),
+    /// The user looks away and the server was left; the last picture stays.
+    Resting,
     /// The connection ended; the last picture stays.
     Reconnecting {
         /// Why it ended.
@@ -123,6 +130,10 @@ pub enum Failure {
     /// The server is not the one that the user named.
     #[error("{0}")]
     Untrusted(String),
+    /// There is no decoder for what the server sends, or none that works, however
+    /// often one is opened.
+    #[error("{0}")]
+    Decoder(DecodeError),
 }
 
 impl Failure {

@@ -19,7 +19,8 @@ use shadecast_protocol::{
 use super::inbox::Inbox;
 use super::{Output, Status, elapsed};
 use crate::{
-    AccessUnit, ClientTiming, ClockEstimate, Decoded, DecodedPicture, Ticket, World, WorldError,
+    AccessUnit, ClientTiming, ClockEstimate, DecodeError, Decoded, DecodedPicture, Ticket, World,
+    WorldError,
 };
 
 /// Pictures with the decoder or decoded, waiting for their updates: enough for
@@ -39,6 +40,11 @@ const UPDATE_PATIENCE: Duration = Duration::from_secs(2);
 /// A decoder that has answered nothing for this long is stuck. Hardware takes a
 /// few tenths of a second to open.
 const DECODER_PATIENCE: Duration = Duration::from_secs(1);
+
+/// Decoders that could not be had, one for each restart, after which there is none:
+/// with the time between restarts five seconds, in which another application may
+/// have given one back.
+const MOST_OPENINGS: u32 = 5;
 
 /// Least time between two requests for a reset; doubles up to three times
 /// while none is answered, for a server that takes long to make a picture.
@@ -60,6 +66,8 @@ pub(super) struct Stream {
     /// What the next frame waits for, and since when.
     stuck: Option<(Missing, ClientTime)>,
     asked_at: Option<ClientTime>,
+    /// Units in a row for which there was no decoder.
+    without_decoder: u32,
 }
 
 #[derive(Debug)]
@@ -111,6 +119,7 @@ impl Stream {
             presented: None,
             stuck: None,
             asked_at: None,
+            without_decoder: 0,
         }
     }
 
@@ -163,21 +172,39 @@ impl Stream {
         }
     }
 
-    pub(super) fn take_decoded(&mut self, now: ClientTime, decoded: Decoded) {
+    /// Takes what became of a picture.
+    ///
+    /// # Errors
+    /// There is no decoder, and trying again has not mended it.
+    pub(super) fn take_decoded(
+        &mut self,
+        now: ClientTime,
+        decoded: Decoded,
+    ) -> Result<(), DecodeError> {
         let Ticket { connection, frame } = decoded.ticket;
         if connection != self.connection {
-            return;
+            return Ok(());
         }
         let Some(waiting) = self.in_flight.iter_mut().find(|one| one.frame == frame) else {
-            return;
+            return Ok(());
         };
         match decoded.picture {
-            Ok(picture) => waiting.decoded = Some(picture),
+            Ok(picture) => {
+                waiting.decoded = Some(picture);
+                self.without_decoder = 0;
+            }
             Err(error) => {
                 tracing::warn!(frame = frame.0, at = now.0, "{error}");
                 self.lose(ResetReason::Decoder);
+                if let DecodeError::Unavailable(_) = error {
+                    self.without_decoder += 1;
+                    if self.without_decoder >= MOST_OPENINGS {
+                        return Err(error);
+                    }
+                }
             }
         }
+        Ok(())
     }
 
     /// Feeds the decoder and shows what is complete.

@@ -280,6 +280,44 @@ fn refusals_and_other_protocols_are_final() {
 }
 
 #[test]
+fn a_session_that_rests_leaves_the_server_and_comes_back_when_it_is_woken() {
+    let mut client = Client::welcomed();
+    client.frame(Server::default().frame());
+    let outputs = client.input(Input::Rest);
+    assert!(matches!(
+        &outputs[..],
+        [
+            Output::Send(ToServer::Bye),
+            Output::Disconnect(_),
+            Output::Status(Status::Resting)
+        ]
+    ));
+    assert!(client.input(Input::Rest).is_empty());
+    // Whatever is on its way still, it stays away.
+    client.input(Input::View(head_view(5)));
+    client.message(ToClient::Bye);
+    client.input(Input::Disconnected(Disconnection::Lost("closed".into())));
+    assert!(client.pass(60_000).is_empty());
+    assert!(connects(&client.input(Input::Wake)));
+    assert!(client.input(Input::Wake).is_empty(), "it is awake");
+    client.input(Input::Connected);
+    client.message(ToClient::Welcome(welcome()));
+    assert_eq!(
+        presented(&client.frame(Server::default().frame())),
+        [0],
+        "a new connection counts from the start"
+    );
+
+    // While it reaches for the server, and when it has left for good.
+    let mut client = Client::new();
+    assert!(connects(&client.input(Input::Tick)));
+    assert!(disconnected(&client.input(Input::Rest)).is_some());
+    client.input(Input::Leave);
+    assert!(client.input(Input::Wake).is_empty());
+    assert!(client.pass(10_000).is_empty());
+}
+
+#[test]
 fn a_server_still_busy_with_this_client_is_tried_again() {
     let mut client = Client::welcomed();
     client.input(Input::Disconnected(Disconnection::Lost("gone".into())));

@@ -37,7 +37,7 @@ pub struct Options {
     /// `courtyard`, or a glTF or GLB file.
     #[arg(long, value_name = "SCENE", default_value = COURTYARD)]
     pub scene: PathBuf,
-    /// How the server places light in the atlas: sas or tss.
+    /// How the server places light in the atlas: sas, snake or tss.
     #[arg(long, default_value_t)]
     pub method: Method,
     /// Size of the courtyard, about.

@@ -7,11 +7,16 @@ use std::{
 };
 
 use anyhow::Context;
+use glam::Vec3;
 use serde_json::json;
-use shadecast_server::{Frame, Stages, patches::PatchedScene, scene::SceneFacts};
+use shadecast_protocol::Hand;
+use shadecast_server::{Frame, Hands, Stages, patches::PatchedScene, scene::SceneFacts};
 use shadecast_transport::SentBytes;
 
 use crate::cli::ServeArguments;
+
+/// The controllers in words.
+const SIDES: [&str; 2] = ["left", "right"];
 
 /// The live line looks back this far.
 const WINDOW: Duration = Duration::from_secs(2);
@@ -36,6 +41,8 @@ pub(super) struct Stats {
     resets: u32,
     sent: SentBytes,
     recent: VecDeque<(Instant, SentBytes)>,
+    /// Of the left and the right button.
+    presses: [u64; 2],
     pub(super) failures: u32,
 }
 
@@ -66,6 +73,7 @@ impl Stats {
             resets: 0,
             sent: SentBytes::default(),
             recent: VecDeque::new(),
+            presses: [0; 2],
             failures: 0,
         }
     }
@@ -97,8 +105,27 @@ impl Stats {
         }
     }
 
+    /// Counts what was pressed between two moments of a session; says where it was
+    /// aimed, a line for each button.
+    pub(super) fn pressed(&mut self, before: &Hands, now: &Hands) -> Vec<String> {
+        let mut lines = Vec::new();
+        for (side, name) in SIDES.into_iter().enumerate() {
+            let new = now.presses[side].saturating_sub(before.presses[side]);
+            self.presses[side] += new;
+            if let (1.., Some(hand)) = (new, now.now[side]) {
+                let aim = hand.world_from_aim;
+                let towards = aim.orientation * Vec3::NEG_Z;
+                lines.push(format!(
+                    "the {name} button was pressed at {:.2} m, aiming along {towards:.2}",
+                    aim.position
+                ));
+            }
+        }
+        lines
+    }
+
     /// The live line.
-    pub(super) fn line(&self, latency: Option<Duration>) -> String {
+    pub(super) fn line(&self, latency: Option<Duration>, hands: &Hands) -> String {
         let (Some((from, first)), Some((to, last))) = (self.recent.front(), self.recent.back())
         else {
             return String::new();
@@ -106,7 +133,7 @@ impl Stats {
         let seconds = (*to - *from).as_secs_f64().max(1e-3);
         let megabits = |bytes: u64| bytes as f64 * 8e-6 / seconds;
         format!(
-            "{:.1} updates/s | video {:.2} Mbit/s | updates {:.2} Mbit/s | PVS {} patches | atlas {:.0} % | latency {}",
+            "{:.1} updates/s | video {:.2} Mbit/s | updates {:.2} Mbit/s | PVS {} patches | atlas {:.0} % | latency {}{}",
             (self.recent.len() - 1) as f64 / seconds,
             megabits(last.video.saturating_sub(first.video)),
             megabits(last.updates.saturating_sub(first.updates)),
@@ -116,6 +143,7 @@ impl Stats {
                 "{:.0} ms",
                 latency.as_secs_f64() * 1e3
             )),
+            held(hands.now, hands.presses),
         )
     }
 
@@ -150,6 +178,7 @@ impl Stats {
             "texels_per_update": median(self.paths.iter().map(|paths| f64::from(*paths))) as u64,
             "video_bytes": self.sent.video,
             "update_bytes": self.sent.updates,
+            "presses": { "left": self.presses[0], "right": self.presses[1] },
             "stages_ms": {
                 "visibility": stage(|s| s.visibility),
                 "atlas": stage(|s| s.atlas),
@@ -164,6 +193,19 @@ impl Stats {
     }
 }
 
+/// The controllers that are there, for the end of the live line.
+fn held(now: [Option<Hand>; 2], presses: [u64; 2]) -> String {
+    let mut text = String::new();
+    for (side, name) in SIDES.into_iter().enumerate() {
+        if let Some(hand) = now[side] {
+            text += if text.is_empty() { " | " } else { ", " };
+            let state = if hand.pressed { " (pressed)" } else { "" };
+            text += &format!("{name} hand {} presses{state}", presses[side]);
+        }
+    }
+    text
+}
+
 fn median(values: impl Iterator<Item = f64>) -> f64 {
     let mut values: Vec<f64> = values.collect();
     values.sort_by(f64::total_cmp);
@@ -176,4 +218,31 @@ fn peak_memory() -> Option<u64> {
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
     let kibibytes: u64 = line.split_whitespace().nth(1)?.parse().ok()?;
     Some(kibibytes * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    use shadecast_protocol::Pose;
+
+    use super::*;
+
+    #[test]
+    fn the_live_line_tells_of_controllers_where_there_are_any() {
+        assert_eq!(held([None; 2], [0; 2]), "");
+        let pressed = |pressed: bool| {
+            Some(Hand {
+                world_from_aim: Pose::IDENTITY,
+                pressed,
+                presses: 7,
+            })
+        };
+        assert_eq!(
+            held([None, pressed(true)], [0, 3]),
+            " | right hand 3 presses (pressed)"
+        );
+        assert_eq!(
+            held([pressed(false), pressed(false)], [0, 3]),
+            " | left hand 0 presses, right hand 3 presses"
+        );
+    }
 }

@@ -397,3 +397,21 @@ fn paths_fill_the_time_there_is_for_light() {
     let next = Session::new(session.config.clone(), at(0), Some(speed));
     assert_eq!(next.speed(), Some(speed));
 }
+
+#[test]
+fn hands_are_those_of_the_newest_view() {
+    let mut session = streaming();
+    assert_eq!(session.hands(), Hands::default());
+    for (seq, presses) in [(0, 5), (2, 7), (1, 6)] {
+        let mut view = view(seq);
+        view.hands[0] = Some(shadecast_protocol::Hand {
+            world_from_aim: Pose::IDENTITY,
+            pressed: presses == 7,
+            presses,
+        });
+        session.hears(ToServer::View(view));
+    }
+    let hands = session.hands();
+    assert_eq!(hands.presses, [2, 0], "reports may overtake each other");
+    assert!(hands.now[0].is_some_and(|hand| hand.pressed));
+}

@@ -35,6 +35,10 @@ pub struct Script {
 pub struct Headset {
     /// Extensions that the runtime offers, without `XR_`.
     pub extensions: Vec<&'static str>,
+    /// Extensions that it offers and then refuses to an instance, without `XR_`.
+    pub refuses: Vec<&'static str>,
+    /// What Vulkan answers when a device is created; 0 where it gives one.
+    pub vulkan_device: i32,
     /// The oldest Vulkan that the runtime takes.
     pub oldest_vulkan: sys::Version,
     /// Whether the runtime is of OpenXR 1.0.
@@ -122,6 +126,8 @@ impl Default for Headset {
                 "FB_display_refresh_rate",
                 "EXT_local_floor",
             ],
+            refuses: Vec::new(),
+            vulkan_device: 0,
             oldest_vulkan: sys::Version::new(1, 0, 0),
             speaks_1_0: true,
             eyes: Eyes {

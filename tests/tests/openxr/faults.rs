@@ -188,6 +188,11 @@ fn a_world_that_does_not_fit_the_device_is_not_shown_and_the_one_before_stays() 
     broken.picture = picture.into();
     rig.sender.send(broken.into());
     rig.run_to(22);
+    let notice = rig.headset.notice(rig.now()).expect("the user is told why");
+    assert!(
+        notice.contains("luma") && notice.contains("255 bytes"),
+        "{notice}"
+    );
     let log = rig.runtime.log();
     assert_eq!(log.broken_rules(), []);
     let middle = |index: usize| pixel(&log.images[index].1[0], 24, 24);
@@ -198,6 +203,9 @@ fn a_world_that_does_not_fit_the_device_is_not_shown_and_the_one_before_stays() 
         1,
         "only the first was shown"
     );
+    rig.sender.send(wall());
+    rig.run_to(25);
+    assert_eq!(rig.headset.notice(rig.now()), None, "the next one is sound");
 }
 
 #[test]
@@ -269,6 +277,21 @@ fn centring_anew_moves_the_play_space_and_nothing_else() {
 
 #[test]
 #[ignore = "needs a Vulkan driver"]
+fn space_warp_is_found_and_not_enabled() {
+    let mut script = Script::default();
+    script.headset.extensions.push("FB_space_warp");
+    let mut rig = Rig::at_the_wall(script);
+    rig.run_to(10);
+    assert!(rig.headset.offers().expect("a session").space_warp);
+    let told = rig.headset.description().expect("a session");
+    assert!(told.contains("not needed: space warp"), "{told}");
+    let log = rig.runtime.log();
+    assert_eq!(log.broken_rules(), []);
+    assert!(!log.extensions.iter().any(|name| name == "FB_space_warp"));
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
 fn what_is_not_offered_is_left_out() {
     let mut script = Script::default();
     script.headset.extensions = vec!["KHR_vulkan_enable2"];
@@ -276,7 +299,18 @@ fn what_is_not_offered_is_left_out() {
     rig.run_to(10);
     let offers = rig.headset.offers().expect("a session");
     let left_out: Vec<_> = offers.left_out().collect();
-    assert_eq!(left_out, ["depth", "display rate", "clock", "local floor"]);
+    let expected = [
+        "depth",
+        "display rate",
+        "clock",
+        "local floor",
+        "controllers of Pico",
+        "space warp",
+    ];
+    assert_eq!(left_out, expected);
+    let told = rig.headset.description().expect("a session");
+    assert!(told.starts_with("2x48x48, "), "{told}");
+    assert!(told.ends_with(&expected.join(", ")), "{told}");
     let log = rig.runtime.log();
     assert_eq!(log.broken_rules(), []);
     assert_eq!(log.extensions, ["KHR_vulkan_enable2"]);

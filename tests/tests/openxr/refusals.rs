@@ -45,6 +45,40 @@ fn a_runtime_that_cannot_serve_is_named_before_any_device_is_made() {
 
 #[test]
 #[ignore = "needs a Vulkan driver"]
+fn a_device_that_lacks_an_extension_is_named() {
+    let said =
+        refusal(|it| it.vulkan_device = ash::vk::Result::ERROR_EXTENSION_NOT_PRESENT.as_raw());
+    assert!(
+        said.starts_with("the GPU driver gave no Vulkan device: ") && said.contains("xtension"),
+        "{said}"
+    );
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
+fn a_runtime_that_refuses_what_it_offers_is_asked_for_less() {
+    let mut script = Script::default();
+    script.headset.refuses = vec!["KHR_composition_layer_depth"];
+    let mut rig = Rig::at_the_wall(script);
+    rig.run_to(8);
+    let log = rig.runtime.log();
+    assert_eq!(log.extensions, ["KHR_vulkan_enable2"]);
+    assert_eq!(
+        log.broken_rules(),
+        [(
+            "xrCreateInstance",
+            shadecast_simulated_runtime::sys::Result::ERROR_EXTENSION_NOT_PRESENT
+        )]
+    );
+    assert_eq!(log.frames[7].layers.len(), 1, "and shows the world");
+
+    // What cannot be done without ends with a sentence.
+    let said = refusal(|it| it.refuses = vec!["KHR_vulkan_enable2"]);
+    assert!(said.contains("gave no instance"), "{said}");
+}
+
+#[test]
+#[ignore = "needs a Vulkan driver"]
 fn pictures_that_the_runtime_does_not_take_are_named() {
     // R8G8B8A8_UNORM and D32_SFLOAT.
     let said = refusal(|it| it.formats = vec![37, 126]);

@@ -34,8 +34,7 @@ impl RuntimeSession {
         if !extensions.khr_vulkan_enable2 {
             return Err(HeadsetError::NoVulkan);
         }
-        let mut offers = Offers::of(&extensions);
-        let instance = create_instance(entry, platform, offers)?;
+        let (instance, mut offers) = create_instance(entry, platform, Offers::of(&extensions))?;
         let system = instance
             .system(xr::FormFactor::HEAD_MOUNTED_DISPLAY)
             .map_err(HeadsetError::NoHeadset)?;
@@ -119,7 +118,7 @@ fn create_instance(
     entry: &xr::Entry,
     platform: &impl xr::PlatformInfo,
     offers: Offers,
-) -> Result<xr::Instance, HeadsetError> {
+) -> Result<(xr::Instance, Offers), HeadsetError> {
     let application = xr::ApplicationInfo {
         application_name: "shadecast",
         application_version: 0,
@@ -128,16 +127,25 @@ fn create_instance(
         // Loaders and runtimes of 1.0 refuse 1.1, and nothing of it is needed.
         api_version: xr::Version::new(1, 0, 0),
     };
-    entry
-        .create_instance(&application, &offers.enable(), &[], platform)
-        .map_err(|result| match result {
-            sys::Result::ERROR_API_VERSION_UNSUPPORTED => HeadsetError::ApiVersion,
-            sys::Result::ERROR_RUNTIME_UNAVAILABLE
-            | sys::Result::ERROR_RUNTIME_FAILURE
-            | sys::Result::ERROR_FILE_ACCESS_ERROR
-            | sys::Result::ERROR_FILE_CONTENTS_INVALID => HeadsetError::NoRuntime(result),
-            _ => refused("gave no instance")(result),
-        })
+    let create = |offers: Offers| {
+        let created = entry.create_instance(&application, &offers.enable(), &[], platform);
+        created.map(|instance| (instance, offers))
+    };
+    let created = match create(offers) {
+        Err(sys::Result::ERROR_EXTENSION_NOT_PRESENT) => {
+            tracing::warn!("the OpenXR runtime refuses an extension that it offers");
+            create(Offers::default())
+        }
+        created => created,
+    };
+    created.map_err(|result| match result {
+        sys::Result::ERROR_API_VERSION_UNSUPPORTED => HeadsetError::ApiVersion,
+        sys::Result::ERROR_RUNTIME_UNAVAILABLE
+        | sys::Result::ERROR_RUNTIME_FAILURE
+        | sys::Result::ERROR_FILE_ACCESS_ERROR
+        | sys::Result::ERROR_FILE_CONTENTS_INVALID => HeadsetError::NoRuntime(result),
+        _ => refused("gave no instance")(result),
+    })
 }
 
 /// Pixels of the two eyes' pictures, which are layers of one.

@@ -1,8 +1,11 @@
 //! The Vulkan half of showing pictures of a platform's decoder, with images that
 //! a software driver has.
 //!
-//! What is not here is the platform: who makes the image, and the sampler that
-//! converts YCbCr, which the software driver lacks. The pass is the same.
+//! What is not here is the platform, which makes the image. The pass is the same;
+//! the sampler converts YCbCr where the driver can, as in `nv12`.
+
+#[cfg(not(target_vendor = "apple"))]
+mod nv12;
 
 use std::any::Any;
 use std::sync::{Arc, Mutex};

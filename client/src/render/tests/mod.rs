@@ -53,7 +53,21 @@ impl Bench {
     }
 
     fn with(config: RendererConfig) -> Self {
-        let gpu = gpu(config.stereo);
+        Self::on(gpu(config.stereo), config)
+    }
+
+    /// On a device that was made otherwise.
+    pub(super) fn on_device(gpu: Gpu) -> Self {
+        let config = RendererConfig {
+            eye_size: [SIZE; 2],
+            eye_format: FORMAT,
+            stereo: gpu.stereo,
+            antialias: false,
+        };
+        Self::on(gpu, config)
+    }
+
+    fn on(gpu: Gpu, config: RendererConfig) -> Self {
         let renderer = Renderer::new(&gpu.device, &gpu.queue, config);
         let eyes = EyeImages::new(&gpu.device, config.eye_size, config.eye_format);
         Self {

@@ -157,3 +157,47 @@ fn epoch_of(message: &mut ToClient, epoch: u32) {
         _ => {}
     }
 }
+
+/// Plays resets to a client for which no decoder can be had, until `most` of them.
+fn without_decoder(client: &mut Client, server: &mut Server, most: u32) -> Vec<Output> {
+    let mut outputs = Vec::new();
+    for _ in 0..most {
+        server.reset();
+        let (update, picture) = server.frame();
+        client.message(update);
+        let asked = client.message(picture);
+        let [Output::Decode(unit)] = &asked[..] else {
+            panic!("one picture is decoded: {asked:?}");
+        };
+        outputs = client.input(Input::Decoded(Decoded {
+            ticket: unit.ticket,
+            picture: Err(DecodeError::Unavailable(
+                "this device has none for H.264".into(),
+            )),
+        }));
+        // Long enough for the next request.
+        client.pass(3_000);
+    }
+    outputs
+}
+
+#[test]
+fn a_decoder_that_cannot_be_had_is_asked_for_a_few_times_and_then_it_is_over() {
+    let mut client = Client::welcomed();
+    let mut server = Server::default();
+    assert_eq!(
+        failure(&without_decoder(&mut client, &mut server, 4)),
+        None,
+        "another application may give its own back"
+    );
+    server.reset();
+    let shown = server.frames();
+    assert_eq!(presented(&client.frame(server.frame())), [shown]);
+
+    // From the start, since one was had meanwhile.
+    let outputs = without_decoder(&mut client, &mut server, 5);
+    let said = failure(&outputs).expect("it is over").to_string();
+    assert_eq!(said, "no video decoder: this device has none for H.264");
+    assert!(disconnected(&outputs).is_some());
+    assert!(client.pass(10_000).is_empty());
+}

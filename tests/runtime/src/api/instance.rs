@@ -6,6 +6,7 @@ use openxr_sys as sys;
 use sys::{Handle, Result as R};
 
 use super::{api, input, list, output, place, text, write_text};
+use crate::Headset;
 use crate::world::{Instance, enter_current};
 
 /// The one headset.
@@ -70,7 +71,12 @@ pub(super) unsafe extern "system" fn create_instance(
             // SAFETY: there are as many as the struct says.
             let name = unsafe { text(*info.enabled_extension_names.add(index)) }?;
             let short = name.strip_prefix("XR_").unwrap_or(name);
-            if !world.script.headset.extensions.contains(&short) {
+            let Headset {
+                extensions: offered,
+                refuses,
+                ..
+            } = &world.script.headset;
+            if !offered.contains(&short) || refuses.contains(&short) {
                 return Err(R::ERROR_EXTENSION_NOT_PRESENT);
             }
             extensions.push(short.to_owned());

@@ -85,6 +85,7 @@ api! {
         device: *mut VkDevice,
         result: *mut VkResult,
     ) {
+        let refusal = vk::Result::from_raw(world.script.headset.vulkan_device);
         let instance = world.instance(instance)?;
         // SAFETY: the arguments are those of the function.
         let info = unsafe { input(info, sys::VulkanDeviceCreateInfoKHR::TYPE) }?;
@@ -96,9 +97,12 @@ api! {
         if description.is_null() {
             return Err(R::ERROR_VALIDATION_FAILURE);
         }
-        // SAFETY: the description is one for this very device.
-        let created = unsafe {
-            vulkan.instance.create_device(vulkan.physical, &*description, None)
+        let created = match refusal {
+            // SAFETY: the description is one for this very device.
+            vk::Result::SUCCESS => unsafe {
+                vulkan.instance.create_device(vulkan.physical, &*description, None)
+            },
+            refusal => Err(refusal),
         };
         let (handle, code) = match created {
             Ok(device) => {
