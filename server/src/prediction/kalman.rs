@@ -34,7 +34,7 @@ const RATE_JUMP: f64 = 3.0;
 /// Faster than any head, m/s and rad/s: a rate beyond it is passed over.
 const FASTEST: f64 = 40.0;
 /// Deviations that a doubt is of.
-const DOUBT_DEVIATIONS: f64 = 2.0;
+const DOUBT_DEVIATIONS: f64 = 1.0;
 
 /// How a head moves, and how well a tracker sees it.
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,7 @@ use shadecast_protocol::{EyeView, Fov, Pose, ViewReport};
 const NEAR: f32 = 0.02;
 /// Largest factor by which an image plane grows: beyond it most of the pictures would
 /// be margin.
-const MOST_ENLARGED: f32 = 1.5;
+const MOST_ENLARGED: f32 = 1.2;
 /// Farthest that viewpoints stand aside of where eyes are expected, metres: about as
 /// far as eyes are apart. From farther away they would see another scene.
 const MOST_ASIDE: f32 = 0.06;
