@@ -204,7 +204,7 @@ impl Pipeline {
     }
 
     /// From now on light is even and no path is traced, to tell what the atlas by itself
-    /// does to a picture: see [`Light::make_even`]. Before the first frame only.
+    /// does to a picture. Before the first frame only.
     pub fn light_evenly(&mut self) {
         self.light.make_even(&self.gpu);
     }
