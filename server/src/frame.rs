@@ -368,7 +368,9 @@ impl Pipeline {
         let mut moved = placed.moved.iter().peekable();
         for placed in &placed.placements {
             let old = moved.next_if(|(patch, ..)| *patch == placed.patch);
-            if old.is_some_and(|(_, old, new)| keeps_shown(*old, *new)) {
+            // Even light does not move along: it is made to be shown wherever it is.
+            let keeps = old.is_some_and(|(_, old, new)| keeps_shown(*old, *new));
+            if keeps && !self.light.is_even() {
                 continue;
             }
             let job = (self.schedule).job(patches, placed.patch, placed.slot, eyes);
