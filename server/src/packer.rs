@@ -1,6 +1,8 @@
 //! Who gives patches their slots in the atlas: one of the methods, by what the scene
 //! was cut for.
 
+pub(crate) mod passes;
+
 use glam::Vec3;
 use shadecast_protocol::Method;
 

@@ -6,40 +6,13 @@ use shadecast_shaders::atlas::{
 use wgpu::ShaderStages;
 
 use super::policy::AtlasShape;
-use crate::gpu::{Binding, Gpu, GpuError, bind, layout, workgroups};
+use crate::{
+    gpu::{Binding, Gpu, GpuError, bind, layout, workgroups},
+    packer::passes::{Outcomes, Threads},
+};
 
 /// Threads of a group, where a thread has a run of patches.
 const GROUP: u32 = 64;
-
-/// How the work is shared among threads. Results do not depend on it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Threads {
-    /// Consecutive patches of one thread.
-    pub(super) run: u32,
-    /// Threads of a group that sums up: a power of two up to 256.
-    pub(super) lanes: u32,
-}
-
-impl Threads {
-    /// Many threads keep a GPU busy. A driver in software counts faster in a few
-    /// long runs, and pays for each barrier with every thread of a group.
-    pub(super) fn best(gpu: &Gpu) -> Self {
-        if gpu.is_software {
-            Self { run: 128, lanes: 8 }
-        } else {
-            Self {
-                run: 32,
-                lanes: 256,
-            }
-        }
-    }
-}
-/// More patches than last frame that the first copy back has room for.
-const SPARE: u32 = 1024;
-/// Bytes of the state.
-const STATE: u64 = size_of::<AtlasState>() as u64;
-/// Bytes of a patch in the list that is read back.
-const ACTIVE: u64 = size_of::<ActivePatch>() as u64;
 
 /// How many groups a kernel gets.
 #[derive(Clone, Copy, Debug)]
@@ -93,13 +66,11 @@ pub(super) struct Passes {
     tally: wgpu::Buffer,
     state: wgpu::Buffer,
     held: wgpu::Buffer,
-    readback: wgpu::Buffer,
+    outcomes: Outcomes<AtlasState, ActivePatch>,
     shape: AtlasShape,
     patches: u32,
     run: u32,
     levels: u32,
-    /// Patches that the next copy back has room for.
-    expected: u32,
 }
 
 impl Passes {
@@ -118,7 +89,10 @@ impl Passes {
         let parameters = gpu.uniform("atlas parameters", size_of::<AtlasParameters>());
         let wishes = gpu.scratch("wishes of patches", of_patches(4))?;
         let blocks = gpu.scratch("blocks of patches", of_patches(8))?;
-        let active = gpu.scratch("active patches", of_patches(ACTIVE))?;
+        let active = gpu.scratch(
+            "active patches",
+            of_patches(size_of::<ActivePatch>() as u64),
+        )?;
         let listed = gpu.scratch("lists of runs", of_patches(4))?;
         let held = gpu.scratch(
             "patches with blocks",
@@ -127,7 +101,7 @@ impl Passes {
         let run_counts = gpu.scratch("active patches of runs", runs * 8)?;
         let slots = gpu.scratch("slots of runs", runs * 4 * 3 * u64::from(levels))?;
         let tally = gpu.scratch("tally of the atlas", TALLY_BYTES)?;
-        let state = gpu.scratch("state of the atlas", STATE)?;
+        let state = gpu.scratch("state of the atlas", size_of::<AtlasState>() as u64)?;
         let stack_words = AtlasState::stack_words(shape.log2_side(), shape.texels());
         let stacks = gpu.scratch("stacks of free blocks", stack_words * 4)?;
 
@@ -189,12 +163,11 @@ impl Passes {
             tally,
             state,
             held,
-            readback: gpu.readback("placement", STATE),
+            outcomes: Outcomes::new(gpu, patches),
             shape,
             patches,
             run,
             levels,
-            expected: 0,
         };
         passes.clear(gpu);
         Ok(passes)
@@ -278,35 +251,18 @@ impl Passes {
         pass.dispatch_workgroups(x, y, 1);
     }
 
-    /// Submits the recorded work and reads what became of it. The list is as long
-    /// as it is; a copy as long as the last one and a little longer mostly has it
-    /// all, and else the rest is fetched.
+    /// Submits the recorded work and reads what became of it.
     pub(super) fn submit_and_read(
         &mut self,
         gpu: &Gpu,
-        mut encoder: wgpu::CommandEncoder,
+        encoder: wgpu::CommandEncoder,
     ) -> Result<(AtlasState, Vec<ActivePatch>), GpuError> {
-        let expected = self.expected.min(self.patches);
-        let bytes = STATE + u64::from(expected) * ACTIVE;
-        if self.readback.size() < bytes {
-            self.readback = gpu.readback("placement", bytes + bytes / 2);
-        }
-        encoder.copy_buffer_to_buffer(&self.state, 0, &self.readback, 0, STATE);
-        let list = u64::from(expected) * ACTIVE;
-        encoder.copy_buffer_to_buffer(&self.active, 0, &self.readback, STATE, list);
-        let (state, mut active) = gpu.submit_and_read(encoder, &self.readback, bytes, |bytes| {
-            let (state, list) = bytes.split_at(STATE as usize);
-            let state: AtlasState = bytemuck::pod_read_unaligned(state);
-            let known = state.active_count.min(expected) as usize;
-            let list: &[ActivePatch] = bytemuck::cast_slice(list);
-            (state, list[..known].to_vec())
-        })?;
-        let count = state.active_count.min(self.patches);
-        if count > expected {
-            let rest = u64::from(expected) * ACTIVE..u64::from(count) * ACTIVE;
-            active.extend(gpu.read::<ActivePatch>(&self.active, rest)?);
-        }
-        self.expected = count + count / 4 + SPARE;
-        Ok((state, active))
+        let Self {
+            outcomes,
+            state,
+            active,
+            ..
+        } = self;
+        outcomes.read(gpu, encoder, state, active, |state| state.active_count)
     }
 }

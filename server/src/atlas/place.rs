@@ -7,10 +7,13 @@ use shadecast_shaders::atlas::{Memory, Outcome, Placer, Seen, Superblocks, statu
 
 use super::{
     Placed,
-    passes::{Passes, Threads, kernel_names},
+    passes::{Passes, kernel_names},
     policy::{AtlasShape, Policy},
 };
-use crate::gpu::{Gpu, GpuError};
+use crate::{
+    gpu::{Gpu, GpuError},
+    packer::passes::Threads,
+};
 
 /// Kernels in their order, and how long the device took for each.
 pub type KernelTimes = Vec<(&'static str, Duration)>;

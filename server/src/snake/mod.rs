@@ -23,7 +23,7 @@ mod tests;
 use thiserror::Error;
 
 pub use footprints::SnakeFootprints;
-pub use place::{KernelTimes, Snake, SnakeTwin};
+pub use place::{Snake, SnakeTwin};
 pub use policy::SnakeShape;
 
 /// Why there is no such atlas.

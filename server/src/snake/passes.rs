@@ -7,34 +7,16 @@ use shadecast_shaders::snake::{
 use wgpu::ShaderStages;
 
 use super::policy::SnakeShape;
-use crate::gpu::{Binding, Gpu, GpuError, bind, layout, workgroups};
+use crate::{
+    gpu::{Binding, Gpu, GpuError, bind, layout, workgroups},
+    packer::passes::{Outcomes, Threads},
+};
 
 /// Threads of a group, where a thread has a run of triangles.
 const GROUP: u32 = 64;
 
-/// How the work is shared among threads. Results do not depend on it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Threads {
-    /// Consecutive triangles of one thread.
-    pub(super) run: u32,
-    /// Threads of a group that sums up: a power of two up to 256.
-    pub(super) lanes: u32,
-}
-
-impl Threads {
-    /// As for blocks: see `atlas::passes`.
-    pub(super) fn best(gpu: &Gpu) -> Self {
-        let [run, lanes] = if gpu.is_software { [128, 8] } else { [32, 256] };
-        Self { run, lanes }
-    }
-}
-
-/// More triangles than last frame that the first copy back has room for.
-const SPARE: u32 = 1024;
 /// Bytes of the state that are read back.
 const STATE: u64 = size_of::<SnakeState>() as u64;
-/// Bytes of a triangle in the list that is read back.
-const ACTIVE: u64 = size_of::<ActiveTriangle>() as u64;
 
 /// How many groups a kernel gets.
 #[derive(Clone, Copy, Debug)]
@@ -84,11 +66,6 @@ fn frame() -> impl Iterator<Item = (&'static str, Groups)> {
     BEFORE.into_iter().chain(attempts).chain(AFTER)
 }
 
-/// Names of the kernels of a frame, in their order.
-pub(super) fn kernel_names() -> impl Iterator<Item = &'static str> {
-    frame().map(|(name, _)| name)
-}
-
 /// Everything of the snake that lies on the GPU.
 #[derive(Debug)]
 pub(super) struct Passes {
@@ -101,11 +78,9 @@ pub(super) struct Passes {
     tally: wgpu::Buffer,
     taken: wgpu::Buffer,
     state: wgpu::Buffer,
-    readback: wgpu::Buffer,
+    outcomes: Outcomes<SnakeState, ActiveTriangle>,
     patches: u32,
     run: u32,
-    /// Triangles that the next copy back has room for.
-    expected: u32,
 }
 
 impl Passes {
@@ -123,7 +98,10 @@ impl Passes {
         let wishes = gpu.scratch("wishes of triangles", of_patches(8))?;
         let templates = gpu.storage("footprints of bins", bytemuck::cast_slice(&templates()))?;
         let slots = gpu.scratch("slots of triangles", of_patches(8))?;
-        let active = gpu.scratch("active triangles", of_patches(ACTIVE))?;
+        let active = gpu.scratch(
+            "active triangles",
+            of_patches(size_of::<ActiveTriangle>() as u64),
+        )?;
         let counts = gpu.scratch("active triangles of runs", runs * 16)?;
         let digits = gpu.scratch("digits of bins", (runs + 1) * 64 * 4)?;
         let tally = gpu.scratch("tally of the snake", TALLY_WORDS * 4)?;
@@ -201,10 +179,9 @@ impl Passes {
             tally,
             taken,
             state,
-            readback: gpu.readback("placement", STATE),
+            outcomes: Outcomes::new(gpu, patches),
             patches,
             run,
-            expected: 0,
         };
         passes.clear(gpu);
         Ok(passes)
@@ -236,40 +213,23 @@ impl Passes {
             .write_buffer(&self.state, 0, bytemuck::cast_slice(&state));
     }
 
-    /// Records the placement of a frame. With `times`, each kernel has a pass of
-    /// its own and writes there when it begins and ends.
+    /// Records the placement of a frame.
     pub(super) fn record(
         &self,
         gpu: &Gpu,
         encoder: &mut wgpu::CommandEncoder,
         parameters: &SnakeParameters,
-        times: Option<&wgpu::QuerySet>,
     ) {
         gpu.queue
             .write_buffer(&self.parameters, 0, bytemuck::bytes_of(parameters));
         encoder.clear_buffer(&self.tally, 0, None);
         encoder.clear_buffer(&self.taken, 0, None);
-        let begin = |encoder: &mut wgpu::CommandEncoder, timestamp_writes| {
-            let descriptor = wgpu::ComputePassDescriptor {
-                label: Some("snake"),
-                timestamp_writes,
-            };
-            encoder.begin_compute_pass(&descriptor).forget_lifetime()
-        };
-        let Some(query_set) = times else {
-            let mut pass = begin(encoder, None);
-            for kernel in &self.kernels {
-                self.dispatch(&mut pass, kernel);
-            }
-            return;
-        };
-        for (index, kernel) in (0..).step_by(2).zip(&self.kernels) {
-            let timestamps = wgpu::ComputePassTimestampWrites {
-                query_set,
-                beginning_of_pass_write_index: Some(index),
-                end_of_pass_write_index: Some(index + 1),
-            };
-            self.dispatch(&mut begin(encoder, Some(timestamps)), kernel);
+        let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor {
+            label: Some("snake"),
+            timestamp_writes: None,
+        });
+        for kernel in &self.kernels {
+            self.dispatch(&mut pass, kernel);
         }
     }
 
@@ -289,34 +249,18 @@ impl Passes {
         pass.dispatch_workgroups(x, y, 1);
     }
 
-    /// Submits the recorded work and reads what became of it. A copy as long as the
-    /// last list and a little longer mostly has it all, and else the rest is fetched.
+    /// Submits the recorded work and reads what became of it.
     pub(super) fn submit_and_read(
         &mut self,
         gpu: &Gpu,
-        mut encoder: wgpu::CommandEncoder,
+        encoder: wgpu::CommandEncoder,
     ) -> Result<(SnakeState, Vec<ActiveTriangle>), GpuError> {
-        let expected = self.expected.min(self.patches);
-        let bytes = STATE + u64::from(expected) * ACTIVE;
-        if self.readback.size() < bytes {
-            self.readback = gpu.readback("placement", bytes + bytes / 2);
-        }
-        encoder.copy_buffer_to_buffer(&self.state, 0, &self.readback, 0, STATE);
-        let list = u64::from(expected) * ACTIVE;
-        encoder.copy_buffer_to_buffer(&self.active, 0, &self.readback, STATE, list);
-        let (state, mut active) = gpu.submit_and_read(encoder, &self.readback, bytes, |bytes| {
-            let (state, list) = bytes.split_at(STATE as usize);
-            let state: SnakeState = bytemuck::pod_read_unaligned(state);
-            let known = state.active_count.min(expected) as usize;
-            let list: Vec<ActiveTriangle> = bytemuck::pod_collect_to_vec(list);
-            (state, list[..known].to_vec())
-        })?;
-        let count = state.active_count.min(self.patches);
-        if count > expected {
-            let rest = u64::from(expected) * ACTIVE..u64::from(count) * ACTIVE;
-            active.extend(gpu.read::<ActiveTriangle>(&self.active, rest)?);
-        }
-        self.expected = count + count / 4 + SPARE;
-        Ok((state, active))
+        let Self {
+            outcomes,
+            state,
+            active,
+            ..
+        } = self;
+        outcomes.read(gpu, encoder, state, active, |state| state.active_count)
     }
 }

@@ -1,21 +1,17 @@
 //! The packer itself: one call a frame. Its twin gives the same on the CPU.
 
-use std::time::Duration;
-
 use shadecast_protocol::Epoch;
 use shadecast_shaders::snake::{Outcome, Packer, Seen, Superblock};
 
 use super::{
-    passes::{Passes, Threads, kernel_names},
+    passes::Passes,
     policy::{Policy, SnakeShape},
 };
 use crate::{
     atlas::Placed,
     gpu::{Gpu, GpuError},
+    packer::passes::Threads,
 };
-
-/// Kernels in their order, and how long the device took for each.
-pub type KernelTimes = Vec<(&'static str, Duration)>;
 
 /// The shading atlas's memory on the GPU, and which triangle has which part of it.
 #[derive(Debug)]
@@ -79,49 +75,8 @@ impl Snake {
         mut encoder: wgpu::CommandEncoder,
     ) -> Result<Placed, GpuError> {
         let parameters = self.policy.parameters(self.passes.patches());
-        self.passes.record(gpu, &mut encoder, &parameters, None);
+        self.passes.record(gpu, &mut encoder, &parameters);
         self.read(gpu, encoder)
-    }
-
-    /// The same, and how long each kernel ran; nothing where the device has no clock.
-    ///
-    /// # Errors
-    /// When the driver fails.
-    pub fn place_timed(&mut self, gpu: &Gpu) -> Result<(Placed, KernelTimes), GpuError> {
-        let mut encoder = gpu
-            .device
-            .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let has_clock = gpu
-            .device
-            .features()
-            .contains(wgpu::Features::TIMESTAMP_QUERY);
-        if !has_clock {
-            return Ok((self.place(gpu, encoder)?, KernelTimes::new()));
-        }
-        let count = 2 * kernel_names().count() as u32;
-        let times = gpu.device.create_query_set(&wgpu::QuerySetDescriptor {
-            label: Some("snake"),
-            ty: wgpu::QueryType::Timestamp,
-            count,
-        });
-        let resolved = gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("times of kernels"),
-            size: u64::from(count) * 8,
-            usage: wgpu::BufferUsages::QUERY_RESOLVE | wgpu::BufferUsages::COPY_SRC,
-            mapped_at_creation: false,
-        });
-        let parameters = self.policy.parameters(self.passes.patches());
-        self.passes
-            .record(gpu, &mut encoder, &parameters, Some(&times));
-        encoder.resolve_query_set(&times, 0..count, &resolved, 0);
-        let placed = self.read(gpu, encoder)?;
-        let ticks: Vec<u64> = gpu.read(&resolved, 0..resolved.size())?;
-        let nanoseconds = f64::from(gpu.queue.get_timestamp_period());
-        let spent = ticks.chunks_exact(2).map(|times| {
-            let ticks = times[1].saturating_sub(times[0]);
-            Duration::from_nanos((ticks as f64 * nanoseconds) as u64)
-        });
-        Ok((placed, kernel_names().zip(spent).collect()))
     }
 
     fn read(&mut self, gpu: &Gpu, encoder: wgpu::CommandEncoder) -> Result<Placed, GpuError> {

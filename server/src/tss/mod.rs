@@ -18,9 +18,10 @@ use shadecast_shaders::tss::{ActiveTriangle, NONE, TssState};
 use crate::{
     atlas::{AtlasStats, Placed, VisiblePatch},
     gpu::{Gpu, GpuError, GpuScene},
+    packer::passes::Threads,
     patches::PatchedScene,
 };
-use passes::{Passes, Threads};
+use passes::Passes;
 
 /// Where each visible triangle is shaded.
 #[derive(Debug)]

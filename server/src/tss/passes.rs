@@ -10,41 +10,12 @@ use wgpu::ShaderStages;
 use crate::{
     atlas::KEEP_UNSEEN,
     gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout, workgroups},
+    packer::passes::{Outcomes, Threads},
     patches::PatchedScene,
 };
 
 /// Threads of a group, where a thread has a run of patches or a triangle.
 const GROUP: u32 = 64;
-/// More triangles than last frame that the first copy back has room for.
-const SPARE: u32 = 1024;
-/// Bytes of the state.
-const STATE: u64 = size_of::<TssState>() as u64;
-/// Bytes of a triangle in the list that is read back.
-const ACTIVE: u64 = size_of::<ActiveTriangle>() as u64;
-
-/// How the work is shared among threads. Results do not depend on it.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Threads {
-    /// Consecutive patches of one thread.
-    pub(super) run: u32,
-    /// Threads of a group that sums up: a power of two up to 256.
-    pub(super) lanes: u32,
-}
-
-impl Threads {
-    /// As the atlas's: many threads keep a GPU busy, and cost a driver in software.
-    pub(super) fn best(gpu: &Gpu) -> Self {
-        if gpu.is_software {
-            Self { run: 128, lanes: 8 }
-        } else {
-            Self {
-                run: 32,
-                lanes: 256,
-            }
-        }
-    }
-}
-
 /// How many groups a kernel gets.
 #[derive(Clone, Copy, Debug)]
 enum Groups {
@@ -85,11 +56,9 @@ pub(super) struct Passes {
     active: wgpu::Buffer,
     tally: wgpu::Buffer,
     state: wgpu::Buffer,
-    readback: wgpu::Buffer,
+    outcomes: Outcomes<TssState, ActiveTriangle>,
     patches: u32,
     run: u32,
-    /// Triangles that the next copy back has room for.
-    expected: u32,
 }
 
 impl Passes {
@@ -112,14 +81,17 @@ impl Passes {
         let never = vec![NONE; patches.max(1) as usize];
         let ages = gpu.storage("ages of triangles", bytemuck::cast_slice(&never))?;
         let shapes = gpu.scratch("shapes of triangles", of_patches(8))?;
-        let active = gpu.scratch("active triangles", of_patches(ACTIVE))?;
+        let active = gpu.scratch(
+            "active triangles",
+            of_patches(size_of::<ActiveTriangle>() as u64),
+        )?;
         let run_counts = gpu.scratch("active triangles of runs", runs * 8)?;
         let tally = gpu.scratch("tally of triangles", TALLY_BYTES)?;
         let cell_bytes = (CLASSES * CLASSES * size_of::<CellPlace>()) as u64;
         let cells = gpu.scratch("places of kinds", cell_bytes)?;
         let digits = gpu.scratch("digits of runs", runs * 4 * CLASSES as u64)?;
         let order = gpu.scratch("order of triangles", of_patches(8))?;
-        let state = gpu.scratch("state of TSS", STATE)?;
+        let state = gpu.scratch("state of TSS", size_of::<TssState>() as u64)?;
 
         let own_layout = layout(
             gpu,
@@ -201,10 +173,9 @@ impl Passes {
             active,
             tally,
             state,
-            readback: gpu.readback("placement", STATE),
+            outcomes: Outcomes::new(gpu, patches),
             patches,
             run,
-            expected: 0,
         })
     }
 
@@ -265,35 +236,19 @@ impl Passes {
         }
     }
 
-    /// Submits the recorded work and reads what became of it. A copy as long as the last
-    /// list and a little longer mostly has all of it, and else the rest is fetched.
+    /// Submits the recorded work and reads what became of it.
     pub(super) fn submit_and_read(
         &mut self,
         gpu: &Gpu,
-        mut encoder: wgpu::CommandEncoder,
+        encoder: wgpu::CommandEncoder,
     ) -> Result<(TssState, Vec<ActiveTriangle>), GpuError> {
-        let expected = self.expected.min(self.patches);
-        let list = u64::from(expected) * ACTIVE;
-        let bytes = STATE + list;
-        if self.readback.size() < bytes {
-            self.readback = gpu.readback("placement", bytes + bytes / 2);
-        }
-        encoder.copy_buffer_to_buffer(&self.state, 0, &self.readback, 0, STATE);
-        encoder.copy_buffer_to_buffer(&self.active, 0, &self.readback, STATE, list);
-        let (state, mut active) = gpu.submit_and_read(encoder, &self.readback, bytes, |bytes| {
-            let (state, list) = bytes.split_at(STATE as usize);
-            let state: TssState = bytemuck::pod_read_unaligned(state);
-            let known = state.active_count.min(expected) as usize;
-            let list: &[ActiveTriangle] = bytemuck::cast_slice(list);
-            (state, list[..known].to_vec())
-        })?;
-        let count = state.active_count.min(self.patches);
-        if count > expected {
-            let rest = u64::from(expected) * ACTIVE..u64::from(count) * ACTIVE;
-            active.extend(gpu.read::<ActiveTriangle>(&self.active, rest)?);
-        }
-        self.expected = count + count / 4 + SPARE;
-        Ok((state, active))
+        let Self {
+            outcomes,
+            state,
+            active,
+            ..
+        } = self;
+        outcomes.read(gpu, encoder, state, active, |state| state.active_count)
     }
 
     #[cfg(test)]

@@ -11,7 +11,7 @@ use shadecast_protocol::Method;
 use shadecast_shaders::tss::{ActiveTriangle, Outcome, Packer, SeenTriangle, Shape, shape, status};
 
 use super::{
-    passes::{Passes, Threads, parameters_of},
+    passes::{Passes, parameters_of},
     *,
 };
 use crate::{

@@ -9,11 +9,11 @@ use shadecast_shaders::{
 };
 
 use super::{
-    super::{AtlasShape, AtlasTwin, KEEP_UNSEEN, Placed, passes::Threads, place::Atlas},
+    super::{AtlasShape, AtlasTwin, KEEP_UNSEEN, Placed, place::Atlas},
     any_frames, seen, shape, view,
     watched::{Noise, Told},
 };
-use crate::gpu::Gpu;
+use crate::{gpu::Gpu, packer::passes::Threads};
 
 /// Random sequences of frames for each shape of atlas.
 const SEQUENCES: u32 = 300;

@@ -6,13 +6,14 @@ use proptest::test_runner::{Config, TestRunner};
 use shadecast_shaders::snake::{Seen, Wish};
 
 use super::{
-    super::{SnakeShape, SnakeTwin, passes::Threads, place::Snake},
+    super::{SnakeShape, SnakeTwin, place::Snake},
     any_frames, nearer, seen, shape, view,
     watched::Told,
 };
 use crate::{
     atlas::{KEEP_UNSEEN, Placed, tests::watched::Noise},
     gpu::Gpu,
+    packer::passes::Threads,
 };
 
 /// Random sequences of frames for each shape of atlas.
