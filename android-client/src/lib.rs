@@ -3,9 +3,11 @@
 //! | file | calls |
 //! |---|---|
 //! | `app.rs` | the native activity's life, and the OpenXR loader |
-//! | `settings.rs` | the intent and the app's folders, for the server's line |
+//! | `phone.rs` | the window of a phone in a viewer, where there is no headset |
+//! | `sensors.rs` | how that is turned |
+//! | `java.rs` | the intent, and what the screen is like |
 //! | `codec.rs` | MediaCodec and ImageReader |
-//! | `images.rs` | AHardwareBuffer into Vulkan |
+//! | `images.rs` | AHardwareBuffer |
 //!
 //! Everything else is `shadecast-client` and is tested on the desktop: the
 //! session, the frame loop, the order and pairing of pictures, their conversion.
@@ -15,7 +17,9 @@
 mod app;
 mod codec;
 mod images;
-mod settings;
+mod java;
+mod phone;
+mod sensors;
 
 use android_activity::AndroidApp;
 use tracing_subscriber::EnvFilter;

@@ -17,7 +17,11 @@ mod session;
 #[cfg(feature = "network")]
 pub mod settings;
 mod steady;
+#[cfg(all(feature = "viewer", not(target_vendor = "apple")))]
+pub mod viewer;
 mod world;
+#[cfg(all(feature = "worn", not(target_vendor = "apple")))]
+pub mod worn;
 
 pub use clock::ClockEstimate;
 #[cfg(feature = "openh264")]

@@ -4,6 +4,8 @@
 //! even where that is wrong: whoever wrote it there wants to know, and not to
 //! end up at another server.
 
+use std::path::PathBuf;
+
 use shadecast_transport::{LineError, ServerLine};
 use thiserror::Error;
 
@@ -30,6 +32,46 @@ pub enum NoServer {
         /// What is wrong with it.
         error: LineError,
     },
+}
+
+/// Its name in either folder of an app.
+const FILE: &str = "server.txt";
+
+/// Finds the line of an app: what started it may say one, its user may have left a
+/// file in the folder that others see, and it remembers the last one in its own.
+///
+/// # Errors
+/// When there is none, or it is no server's line.
+pub fn find(
+    extra: Option<String>,
+    shared: Option<PathBuf>,
+    own: Option<PathBuf>,
+) -> Result<ServerLine, NoServer> {
+    let [file, memory] = [shared, own].map(|folder| folder.map(|folder| folder.join(FILE)));
+    let read = |path: &Option<PathBuf>| std::fs::read_to_string(path.as_ref()?).ok();
+    let line = server_line(&[
+        Place {
+            name: "the extra \"server\" of the intent".into(),
+            text: extra,
+        },
+        Place {
+            name: file.as_ref().map_or_else(
+                || FILE.into(),
+                |path| format!("the file {}", path.display()),
+            ),
+            text: read(&file),
+        },
+        Place {
+            name: "what was remembered".into(),
+            text: read(&memory),
+        },
+    ])?;
+    if let Some(memory) = memory
+        && let Err(error) = std::fs::write(&memory, line.to_string())
+    {
+        tracing::warn!("the server will not be remembered: {error}");
+    }
+    Ok(line)
 }
 
 /// The line in the first of the places that says something. Lines that begin
@@ -85,6 +127,34 @@ mod tests {
         assert_eq!(port([Some(&one), Some(&two), None]), Some(1));
         assert_eq!(port([None, Some(&two), Some(&one)]), Some(2));
         assert_eq!(port([Some(" \n\n"), Some("# none"), Some(&one)]), Some(1));
+    }
+
+    #[test]
+    fn an_app_remembers_the_line_that_it_was_started_with() {
+        let folder = std::env::temp_dir().join(format!("shadecast-{}", std::process::id()));
+        let [shared, own] = ["shared", "own"].map(|name| folder.join(name));
+        for folder in [&shared, &own] {
+            std::fs::create_dir_all(folder).unwrap();
+        }
+        let find = |extra: Option<&str>| {
+            super::find(
+                extra.map(Into::into),
+                Some(shared.clone()),
+                Some(own.clone()),
+            )
+        };
+        let said = find(None).unwrap_err().to_string();
+        assert!(said.contains("shared/server.txt, or what was"), "{said}");
+        assert_eq!(find(Some(&line(1))).unwrap().address.port(), 1);
+        assert_eq!(find(None).unwrap().address.port(), 1, "remembered");
+        std::fs::write(shared.join(FILE), line(2)).unwrap();
+        assert_eq!(find(None).unwrap().address.port(), 2, "left by its user");
+        std::fs::write(shared.join(FILE), "nonsense").unwrap();
+        assert!(find(None).is_err(), "what is wrong is said");
+        std::fs::remove_dir_all(&folder).unwrap();
+        // Without folders there is nothing to remember by, and no harm.
+        let line = super::find(Some(line(3)), None, None).unwrap();
+        assert_eq!(line.address.port(), 3);
     }
 
     #[test]

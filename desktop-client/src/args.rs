@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Parser;
 use glam::{Quat, Vec3};
-use shadecast_client::render::LensProfile;
+use shadecast_client::render::{EyeLens, Eyes, LensProfile, Optics, PhoneScreen};
 use shadecast_protocol::{EyeView, Fov, Pose};
 use shadecast_transport::ServerLine;
 
@@ -55,8 +55,8 @@ pub(crate) struct Args {
     #[arg(long, value_name = "N", value_parser = within(0.1, 86_400.0))]
     pub(crate) seconds: Option<f64>,
 
-    /// Distortion against the lenses: mild, none, or a file
-    #[arg(long, value_name = "mild|none|FILE.json", default_value = "mild", long_help = LENS_HELP)]
+    /// Distortion against the lenses: mild, none, those of a phone in a Cardboard, or a file
+    #[arg(long, value_name = "mild|none|cardboard|FILE.json", default_value = "mild", long_help = LENS_HELP)]
     lens: String,
 
     /// Writes pictures and client.json into this folder
@@ -84,11 +84,14 @@ pub(crate) struct Args {
     pub(crate) openxr: bool,
 }
 
-const LENS_HELP: &str = r#"Distortion against the lenses: mild, none (the pass is skipped), or a file:
+const LENS_HELP: &str = r#"Distortion against the lenses: mild, none (the pass is skipped), cardboard, or a file:
 {"centre": [x, y], "k": [[red, red], [green, green], [blue, blue]]}
 
 Lengths are half heights of the picture; a pixel at distance r from the centre shows what is at
-r (1 + k[0] r^2 + k[1] r^4). The centre is the left eye's; the right eye has it mirrored."#;
+r (1 + k[0] r^2 + k[1] r^4). The centre is the left eye's; the right eye has it mirrored.
+
+With cardboard the eyes are those behind a phone of 130x65 mm in a Cardboard of 2015: --fov and
+--ipd are left aside."#;
 
 const EXAMPLES: &str = "Examples:
   shadecast-desktop \"$LINE\" --seconds 20 --out run
@@ -118,6 +121,9 @@ impl Args {
 
     /// Left and right eye.
     pub(crate) fn eyes(&self) -> [EyeView; 2] {
+        if let Some(phone) = self.phone() {
+            return phone.views;
+        }
         [-0.5, 0.5].map(|side| EyeView {
             head_from_eye: Pose {
                 position: Vec3::new(self.ipd as f32 * side, 0.0, 0.0),
@@ -127,15 +133,29 @@ impl Args {
         })
     }
 
+    /// Of a phone in a viewer, whose screen is as wide as two pictures.
+    fn phone(&self) -> Option<Eyes> {
+        let side = u32::from(self.eye_size);
+        let screen = PhoneScreen {
+            pixels_an_inch: [side as f32 / 0.065 * 0.0254; 2],
+            rate: self.display_rate() as f32,
+            quarters: 1,
+        };
+        let is_asked = self.lens == "cardboard";
+        is_asked.then(|| Optics::CARDBOARD.eyes([2 * side, side], screen).ok())?
+    }
+
     /// None where the lens pass is skipped.
-    pub(crate) fn lens(&self) -> Result<Option<LensProfile>> {
-        match self.lens.as_str() {
-            "none" => Ok(None),
-            "mild" => Ok(Some(LensProfile::mild())),
-            file => read_lens(Path::new(file))
-                .with_context(|| format!("lens profile {file}"))
-                .map(Some),
+    pub(crate) fn lenses(&self) -> Result<Option<[EyeLens; 2]>> {
+        if let Some(phone) = self.phone() {
+            return Ok(Some(phone.lenses));
         }
+        let profile = match self.lens.as_str() {
+            "none" => return Ok(None),
+            "mild" => LensProfile::mild(),
+            file => read_lens(Path::new(file)).with_context(|| format!("lens profile {file}"))?,
+        };
+        Ok(Some(profile.eyes(1.0)))
     }
 }
 
@@ -188,7 +208,16 @@ mod tests {
             (right.head_from_eye.position.x - left.head_from_eye.position.x - 0.063).abs() < 1e-6
         );
         assert!(left.fov.is_valid());
-        assert_eq!(args.lens().unwrap(), Some(LensProfile::mild()));
+        let mild = LensProfile::mild().eyes(1.0);
+        assert_eq!(args.lenses().unwrap(), Some(mild));
+        let phone = parse(&["--lens", "cardboard"]).unwrap();
+        let [left, right] = phone.eyes();
+        assert!(
+            left.fov.left < left.fov.right * -1.05,
+            "further to the outside"
+        );
+        assert_eq!(left.fov.left, -right.fov.right);
+        assert!(phone.lenses().unwrap().is_some());
     }
 
     #[test]
@@ -207,7 +236,7 @@ mod tests {
             assert!(parse(bad).is_err(), "{bad:?}");
         }
         assert!(Args::try_parse_from(["shadecast-desktop", "http://example.com"]).is_err());
-        let missing = parse(&["--lens", "/nowhere.json"]).unwrap().lens();
+        let missing = parse(&["--lens", "/nowhere.json"]).unwrap().lenses();
         assert!(format!("{:#}", missing.unwrap_err()).contains("/nowhere.json"));
     }
 }

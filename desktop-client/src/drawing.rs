@@ -3,7 +3,7 @@
 use anyhow::{Context, Result};
 use shadecast_client::ClientFrame;
 use shadecast_client::render::{
-    EyeCamera, EyeImages, Gpu, LensPass, LensProfile, Pixels, Readback, Renderer, RendererConfig,
+    EyeCamera, EyeImages, EyeLens, Gpu, LensPass, Pixels, Readback, Renderer, RendererConfig,
     Viewport,
 };
 use shadecast_protocol::Sky;
@@ -47,9 +47,9 @@ impl Drawing {
         Ok(self.renderer.upload(frame)?)
     }
 
-    /// Bends the eyes into targets of `format`.
-    pub(crate) fn lens_pass(&self, format: wgpu::TextureFormat, profile: LensProfile) -> LensPass {
-        LensPass::new(&self.gpu.device, &self.eyes, format, profile)
+    /// The pictures that are drawn into.
+    pub(crate) fn eyes(&self) -> &EyeImages {
+        &self.eyes
     }
 
     /// Draws both eyes, lets `finish` add what follows, and waits for the GPU.
@@ -126,7 +126,7 @@ pub(crate) struct Panel {
 }
 
 impl Panel {
-    pub(crate) fn new(drawing: &Drawing, profile: LensProfile) -> Self {
+    pub(crate) fn new(drawing: &Drawing, lenses: [EyeLens; 2]) -> Self {
         let eye = drawing.eyes.texture().size();
         let texture = drawing.gpu.device.create_texture(&wgpu::TextureDescriptor {
             label: Some("panel"),
@@ -143,7 +143,12 @@ impl Panel {
             view_formats: &[],
         });
         Self {
-            lens: drawing.lens_pass(drawing.eye_format, profile),
+            lens: LensPass::new(
+                &drawing.gpu.device,
+                &drawing.eyes,
+                drawing.eye_format,
+                lenses,
+            ),
             view: texture.create_view(&wgpu::TextureViewDescriptor::default()),
             texture,
         }

@@ -24,7 +24,7 @@ const EYE_FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 pub(crate) fn run(args: &Args) -> Result<()> {
     let clock = Clock::start();
     let trace = args.head_trace()?;
-    let lens = args.lens()?;
+    let lenses = args.lenses()?;
     let mut capture = match (&args.out, args.seconds) {
         (Some(folder), Some(seconds)) => {
             Some(Capture::new(folder, seconds, args.moments, args.samples)?)
@@ -33,7 +33,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
     };
     let instance = wgpu::Instance::new(wgpu::InstanceDescriptor::new_without_display_handle());
     let drawing = Drawing::new(Gpu::open(&instance, None)?, args.eye_size, EYE_FORMAT);
-    let panel = lens.map(|profile| Panel::new(&drawing, profile));
+    let panel = lenses.map(|lenses| Panel::new(&drawing, lenses));
     let mut headset = Headset::start(args, clock, drawing)?;
 
     let began = clock.now();

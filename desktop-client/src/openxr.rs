@@ -5,7 +5,8 @@ use std::time::Duration;
 use anyhow::Result;
 use cpu_time::ThreadTime;
 use shadecast_client::network::Event;
-use shadecast_client::openxr::{self, Frame, HeadsetClient, HeadsetConfig, Turn};
+use shadecast_client::openxr::{self, Headset, HeadsetConfig};
+use shadecast_client::worn::{Frame, HeadsetClient, IDLE, Turn};
 use shadecast_client::{OpenH264Decoder, Status};
 
 use crate::args::Args;
@@ -18,16 +19,12 @@ pub(crate) fn run(args: &Args) -> Result<()> {
         display_rate: args.asked_display_rate(),
         ..HeadsetConfig::default()
     };
-    let mut client = HeadsetClient::start(
-        openxr::load()?,
-        (),
-        config,
-        args.line.clone(),
-        OpenH264Decoder::new(),
-        MAX_ATLAS_SIDE as u16,
-    )?;
+    let entry = openxr::load()?;
+    let mut client = HeadsetClient::open(|frames| Headset::open(entry, (), config, frames))?;
+    let (decoder, largest) = (OpenH264Decoder::new(), MAX_ATLAS_SIDE as u16);
+    client.connect(args.line.clone(), decoder, largest)?;
     let interrupt = Interrupt::watch()?;
-    if let Some(headset) = client.headset().description() {
+    if let Some(headset) = client.display().description() {
         eprintln!("headset: {headset}");
     }
     let mut pace = Pace::default();
@@ -49,7 +46,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
                 if interrupt.came() {
                     client.leave()?;
                 }
-                std::thread::sleep(openxr::IDLE);
+                std::thread::sleep(IDLE);
             }
             Turn::Exit => break,
         }

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
 use shadecast_client::Clock;
-use shadecast_client::render::{Gpu, LensPass, LensProfile, Viewport};
+use shadecast_client::render::{EyeLens, Gpu, LensPass, LensProfile, Screen};
 use shadecast_protocol::ClientTime;
 use winit::application::ApplicationHandler;
 use winit::dpi::PhysicalSize;
@@ -23,14 +23,14 @@ use crate::pilot::Pilot;
 
 /// Runs until the window is closed.
 pub(crate) fn run(args: &Args) -> Result<()> {
-    let lens = args.lens()?.unwrap_or(LensProfile::IDENTITY);
+    let lenses = args.lenses()?.unwrap_or(LensProfile::IDENTITY.eyes(1.0));
     let events = EventLoop::new().map_err(|_| {
         anyhow!("there is no display to open a window on: run it on a desktop, or without --window")
     })?;
     let mut app = App {
         args,
         clock: Clock::start(),
-        lens,
+        lenses,
         open: None,
         outcome: Ok(()),
     };
@@ -41,7 +41,7 @@ pub(crate) fn run(args: &Args) -> Result<()> {
 struct App<'a> {
     args: &'a Args,
     clock: Clock,
-    lens: LensProfile,
+    lenses: [EyeLens; 2],
     open: Option<Open>,
     outcome: Result<()>,
 }
@@ -49,8 +49,7 @@ struct App<'a> {
 /// A window and what is drawn in it.
 struct Open {
     // Before the window, which it draws into.
-    surface: wgpu::Surface<'static>,
-    config: wgpu::SurfaceConfiguration,
+    screen: Screen,
     window: Arc<Window>,
     headset: Headset,
     lens: LensPass,
@@ -64,7 +63,7 @@ struct Open {
 impl ApplicationHandler for App<'_> {
     fn resumed(&mut self, events: &ActiveEventLoop) {
         if self.open.is_none() {
-            match Open::new(self.args, self.clock, self.lens, events) {
+            match Open::new(self.args, self.clock, self.lenses, events) {
                 Ok(open) => self.open = Some(open),
                 Err(error) => self.end(events, Err(error)),
             }
@@ -124,7 +123,12 @@ impl App<'_> {
 }
 
 impl Open {
-    fn new(args: &Args, clock: Clock, lens: LensProfile, events: &ActiveEventLoop) -> Result<Self> {
+    fn new(
+        args: &Args,
+        clock: Clock,
+        lenses: [EyeLens; 2],
+        events: &ActiveEventLoop,
+    ) -> Result<Self> {
         let eye = u32::from(args.eye_size);
         let attributes = Window::default_attributes()
             .with_title("shadecast")
@@ -141,19 +145,15 @@ impl Open {
             .create_surface(Arc::clone(&window))
             .context("cannot draw into the window")?;
         let gpu = Gpu::open(&instance, Some(&surface))?;
-        let config = configuration(&surface, &gpu, window.inner_size())?;
-        surface.configure(&gpu.device, &config);
-        let eye_format = if config.format.is_srgb() {
-            wgpu::TextureFormat::Rgba8UnormSrgb
-        } else {
-            wgpu::TextureFormat::Rgba8Unorm
-        };
-        let drawing = Drawing::new(gpu, args.eye_size, eye_format);
+        let size = window.inner_size();
+        // Without waiting for the monitor: the display's clock is our own.
+        let present_mode = wgpu::PresentMode::AutoNoVsync;
+        let screen = Screen::new(surface, &gpu, [size.width, size.height], present_mode)?;
+        let drawing = Drawing::new(gpu, args.eye_size, screen.eye_format());
         Ok(Self {
-            lens: drawing.lens_pass(config.format, lens),
+            lens: screen.lens_pass(&drawing.gpu().device, drawing.eyes(), lenses),
             headset: Headset::start(args, clock, drawing)?,
-            surface,
-            config,
+            screen,
             window,
             display: DisplayClock::new(clock.now(), args.display_rate()),
             pilot: Pilot::new(),
@@ -164,32 +164,17 @@ impl Open {
 
     /// False when the run is over.
     fn turn(&mut self, clock: Clock, limit: Option<f64>) -> Result<bool> {
-        use wgpu::CurrentSurfaceTexture::{Lost, Outdated, Suboptimal, Success, Validation};
         let now = clock.now();
         let display_at = self.display.begin(now);
         let elapsed = now.0.saturating_sub(self.last.0) as f32 * 1e-9;
         self.last = now;
         let head = self.pilot.step(elapsed);
-        let picture = match self.surface.get_current_texture() {
-            Success(picture) | Suboptimal(picture) => Some(picture),
-            Outdated | Validation => {
-                self.configure();
-                None
-            }
-            Lost => return Err(anyhow!("the window's surface was lost")),
-            // Hidden: the session goes on.
-            _ => None,
-        };
-        let (lens, halves) = (
-            &self.lens,
-            Viewport::halves([self.config.width, self.config.height]),
-        );
+        // Where it is hidden, the session goes on.
+        let picture = self.screen.next(&self.headset.drawing.gpu().device)?;
+        let (screen, lens) = (&self.screen, &self.lens);
         let turn = self.headset.turn(display_at, head, |encoder| {
             if let Some(picture) = &picture {
-                let view = picture
-                    .texture
-                    .create_view(&wgpu::TextureViewDescriptor::default());
-                lens.draw(encoder, &view, halves);
+                screen.draw(encoder, lens, picture);
             }
         })?;
         if let Some(picture) = picture {
@@ -206,18 +191,10 @@ impl Open {
     }
 
     fn resize(&mut self, size: PhysicalSize<u32>) {
-        let limit = self.headset.drawing.gpu().device.limits();
-        let limit = limit.max_texture_dimension_2d;
         if size.width >= 2 && size.height >= 1 {
-            self.config.width = size.width.min(limit);
-            self.config.height = size.height.min(limit);
-            self.configure();
+            let device = &self.headset.drawing.gpu().device;
+            self.screen.resize(device, [size.width, size.height]);
         }
-    }
-
-    fn configure(&self) {
-        let device = &self.headset.drawing.gpu().device;
-        self.surface.configure(device, &self.config);
     }
 
     /// Not every window system does either; looking around then ends at the
@@ -230,27 +207,4 @@ impl Open {
             .or_else(|_| self.window.set_cursor_grab(CursorGrabMode::Confined));
         self.window.set_cursor_visible(false);
     }
-}
-
-/// Without waiting for the monitor: the display's clock is our own.
-fn configuration(
-    surface: &wgpu::Surface<'_>,
-    gpu: &Gpu,
-    size: PhysicalSize<u32>,
-) -> Result<wgpu::SurfaceConfiguration> {
-    let limit = gpu.device.limits().max_texture_dimension_2d;
-    let mut config = surface
-        .get_default_config(
-            &gpu.adapter,
-            size.width.clamp(2, limit),
-            size.height.clamp(1, limit),
-        )
-        .context("the GPU cannot draw into this window")?;
-    let formats = surface.get_capabilities(&gpu.adapter).formats;
-    // The colours are encoded for a display already.
-    if let Some(plain) = formats.iter().find(|format| !format.is_srgb()) {
-        config.format = *plain;
-    }
-    config.present_mode = wgpu::PresentMode::AutoNoVsync;
-    Ok(config)
 }

@@ -7,7 +7,8 @@ mod wall_server;
 use std::time::{Duration, Instant};
 
 use shadecast_client::network::Event;
-use shadecast_client::openxr::{self, HeadsetClient, HeadsetConfig, Turn, api};
+use shadecast_client::openxr::{Headset, HeadsetConfig, api};
+use shadecast_client::worn::{HeadsetClient, IDLE, Turn};
 use shadecast_client::{OpenH264Decoder, Status};
 use shadecast_simulated_runtime::{Image, Runtime, Script};
 use wall_server::{Mishap, WallServer};
@@ -16,7 +17,7 @@ use wall_server::{Mishap, WallServer};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 struct Worn {
-    client: HeadsetClient,
+    client: HeadsetClient<Headset>,
     runtime: Runtime,
     statuses: Vec<Status>,
     fresh: u32,
@@ -32,7 +33,7 @@ impl Worn {
         });
         match turn.expect("the client goes on") {
             Turn::Frame(frame) => self.fresh += u32::from(frame.fresh),
-            _ => self.runtime.pass(openxr::IDLE),
+            _ => self.runtime.pass(IDLE),
         }
         // Virtual frames cost no time, and the network's are real.
         std::thread::sleep(Duration::from_millis(1));
@@ -77,15 +78,14 @@ fn a_paused_client_leaves_its_server_keeps_its_world_and_comes_back() {
     let runtime = Runtime::new(script);
     // SAFETY: the simulation answers as OpenXR says.
     let entry = unsafe { api::Entry::from_get_instance_proc_addr(runtime.entry(), &()) };
-    let client = HeadsetClient::start(
-        entry.expect("its functions"),
-        (),
-        HeadsetConfig::default(),
-        server.line.parse().expect("a server's line"),
-        OpenH264Decoder::new(),
-        4096,
-    )
-    .expect("a client");
+    let entry = entry.expect("its functions");
+    let mut client =
+        HeadsetClient::open(|frames| Headset::open(entry, (), HeadsetConfig::default(), frames))
+            .expect("a headset");
+    let line = server.line.parse().expect("a server's line");
+    client
+        .connect(line, OpenH264Decoder::new(), 4096)
+        .expect("a client");
     let mut worn = Worn {
         client,
         runtime,

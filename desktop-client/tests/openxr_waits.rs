@@ -16,7 +16,8 @@ use std::sync::atomic::{AtomicBool, AtomicPtr, AtomicU32, AtomicUsize, Ordering:
 use std::time::{Duration, Instant};
 
 use shadecast_client::network::{Event, Network};
-use shadecast_client::openxr::{self, Headset, HeadsetConfig, Turn, api};
+use shadecast_client::openxr::{Headset, HeadsetConfig, api};
+use shadecast_client::worn::{Display, IDLE, Turn};
 use shadecast_client::{
     AccessUnit, Clock, Decoded, Decoder, Input, OpenH264Decoder, render::frame_channel,
 };
@@ -259,7 +260,7 @@ fn the_frame_loop_goes_on_while_network_and_decoder_stand_still() {
         match turn.expect("the headset goes on") {
             Turn::Frame(frame) => fresh += u32::from(frame.fresh),
             _ => {
-                runtime.pass(openxr::IDLE);
+                runtime.pass(IDLE);
                 continue;
             }
         }

@@ -19,7 +19,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Context;
 use cpu_time::ThreadTime;
-use shadecast_client::openxr::{Headset, HeadsetConfig, Turn, api};
+use shadecast_client::openxr::{Headset, HeadsetConfig, api};
+use shadecast_client::worn::{Display, Turn};
 use shadecast_client::{ClientFrame, Clock, render::frame_channel};
 use shadecast_protocol::Welcome;
 use shadecast_server::scene::courtyard;

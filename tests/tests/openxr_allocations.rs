@@ -11,9 +11,10 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use shadecast_client::network::Network;
-use shadecast_client::openxr::{Headset, HeadsetConfig, Turn, api};
+use shadecast_client::openxr::{Headset, HeadsetConfig, api};
 use shadecast_client::render::vulkan::{DirectHost, Extras, VulkanGpu};
 use shadecast_client::render::{EyeCamera, EyeImages, Renderer, RendererConfig, frame_channel};
+use shadecast_client::worn::{Display, Turn};
 use shadecast_client::{
     ClientFrame, ClientTiming, Clock, DecodedPicture, DrawVertex, HeadView, Input, OpenH264Decoder,
     YuvPicture,

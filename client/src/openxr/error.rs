@@ -62,6 +62,15 @@ pub enum HeadsetError {
 }
 
 impl HeadsetError {
+    /// Whether there is no headset at all, so that pictures may be shown elsewhere.
+    #[must_use]
+    pub fn is_absence(&self) -> bool {
+        matches!(
+            self,
+            Self::NoLoader(_) | Self::NoRuntime(_) | Self::NoHeadset(_)
+        )
+    }
+
     /// Whether the session, the instance or the headset is gone and may come
     /// back.
     #[must_use]

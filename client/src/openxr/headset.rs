@@ -3,24 +3,17 @@
 use std::time::Duration;
 
 use ::openxr as xr;
-use shadecast_protocol::{ClientTime, Pose, Welcome};
+use shadecast_protocol::{ClientTime, Pose};
 
-use super::held::Held;
 use super::session::{RuntimeSession, SessionTurn};
 use super::{Ending, HeadsetError, LifeCycle, Offers};
+use crate::Input;
 use crate::render::vulkan::{Extras, VulkanGpu};
-use crate::render::{FrameReceiver, Renderer, Stereo};
-use crate::{Input, Status};
-
-/// How long whoever runs a headset sleeps after a turn that drew nothing.
-pub const IDLE: Duration = Duration::from_millis(10);
+use crate::render::{FrameReceiver, Stereo};
+use crate::worn::{Display, Held, OnDevice, Turn};
 
 /// Between two attempts to reach a runtime that was lost.
 const RETRY: Duration = Duration::from_secs(1);
-
-/// Called with every device that is made, and with the renderer on it, before
-/// anything is drawn.
-pub type OnDevice = Box<dyn FnMut(&VulkanGpu, &mut Renderer)>;
 
 /// What a headset is opened with.
 pub struct HeadsetConfig {
@@ -46,39 +39,6 @@ impl Default for HeadsetConfig {
             on_device: None,
         }
     }
-}
-
-/// What became of a turn.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Turn {
-    /// The runtime wants no frames now: sleep for [`IDLE`] and ask again.
-    Idle,
-    /// A display frame has passed.
-    Frame(Frame),
-    /// The session was lost. It is opened anew in a later turn.
-    Lost,
-    /// The user left: the headset is done with.
-    Exit,
-}
-
-/// A display frame.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Frame {
-    /// When the runtime said that it is time for it.
-    pub began: ClientTime,
-    /// When its light leaves the display.
-    pub display_at: ClientTime,
-    /// Between two frames of the display.
-    pub period: Duration,
-    /// How long it took to hand a new world to the GPU.
-    pub uploading: Duration,
-    /// How long it took to record and submit what is drawn: the driver's time for
-    /// the most part.
-    pub drawing: Duration,
-    /// Whether something was drawn and submitted.
-    pub drawn: bool,
-    /// Whether a frame of the server was shown for the first time.
-    pub fresh: bool,
 }
 
 /// A headset, and the world that is shown in it.
@@ -113,43 +73,6 @@ impl<P: xr::PlatformInfo> Headset<P> {
         })
     }
 
-    /// Passes a display frame, or none while the runtime wants none. `now` reads
-    /// the client's clock; what the server is to hear goes to `tell` at once.
-    ///
-    /// # Errors
-    /// When the headset can no longer be used; a session that is merely lost is
-    /// no error.
-    pub fn turn(
-        &mut self,
-        now: &dyn Fn() -> ClientTime,
-        tell: &mut dyn FnMut(Input),
-    ) -> Result<Turn, HeadsetError> {
-        let Some(session) = &mut self.session else {
-            return self.reopen(now());
-        };
-        let turn = match session.turn(&mut self.held, now, tell) {
-            Err(error) if error.is_loss() => {
-                tracing::warn!("{error}");
-                SessionTurn::Ended(Ending::Lost)
-            }
-            turn => turn?,
-        };
-        Ok(match turn {
-            SessionTurn::Idle => Turn::Idle,
-            SessionTurn::Frame(frame) => Turn::Frame(frame),
-            SessionTurn::Ended(ending) => {
-                self.session = None;
-                match ending {
-                    Ending::Exit => Turn::Exit,
-                    Ending::Lost => {
-                        self.retry_at = later(now(), RETRY);
-                        Turn::Lost
-                    }
-                }
-            }
-        })
-    }
-
     fn reopen(&mut self, now: ClientTime) -> Result<Turn, HeadsetError> {
         if now < self.retry_at {
             return Ok(Turn::Idle);
@@ -163,32 +86,6 @@ impl<P: xr::PlatformInfo> Headset<P> {
             Err(error) => return Err(error),
         }
         Ok(Turn::Idle)
-    }
-
-    /// A session with the server begins.
-    pub fn welcome(&mut self, welcome: &Welcome) {
-        self.held.welcome(welcome);
-    }
-
-    /// What the session with the server is doing, for the user in the headset,
-    /// who is told when pictures stop coming.
-    pub fn take_status(&mut self, status: &Status) {
-        self.held.take_status(status);
-    }
-
-    /// Shows a sentence in the world, until it is taken back.
-    pub fn say(&mut self, sentence: Option<String>) {
-        self.held.say(sentence);
-    }
-
-    /// Asks the runtime to let the user leave; a later turn is [`Turn::Exit`].
-    ///
-    /// # Errors
-    /// When the runtime refuses.
-    pub fn request_exit(&self) -> Result<(), HeadsetError> {
-        self.session
-            .as_ref()
-            .map_or(Ok(()), RuntimeSession::request_exit)
     }
 
     /// The device that is drawn with; none while the session is lost.
@@ -226,11 +123,63 @@ impl<P: xr::PlatformInfo> Headset<P> {
     pub fn world_from_play(&self) -> Pose {
         self.held.world_from_play
     }
+}
 
-    /// What the user is told at this time, if anything.
-    #[must_use]
-    pub fn notice(&self, now: ClientTime) -> Option<&str> {
-        self.held.notice(now)
+impl<P: xr::PlatformInfo> Display for Headset<P> {
+    type Error = HeadsetError;
+
+    fn held(&self) -> &Held {
+        &self.held
+    }
+
+    fn held_mut(&mut self) -> &mut Held {
+        &mut self.held
+    }
+
+    fn turn(
+        &mut self,
+        now: &dyn Fn() -> ClientTime,
+        tell: &mut dyn FnMut(Input),
+    ) -> Result<Turn, HeadsetError> {
+        let Some(session) = &mut self.session else {
+            return self.reopen(now());
+        };
+        let turn = match session.turn(&mut self.held, now, tell) {
+            Err(error) if error.is_loss() => {
+                tracing::warn!("{error}");
+                SessionTurn::Ended(Ending::Lost)
+            }
+            turn => turn?,
+        };
+        Ok(match turn {
+            SessionTurn::Idle => Turn::Idle,
+            SessionTurn::Frame(frame) => Turn::Frame(frame),
+            SessionTurn::Ended(ending) => {
+                self.session = None;
+                match ending {
+                    Ending::Exit => Turn::Exit,
+                    Ending::Lost => {
+                        self.retry_at = later(now(), RETRY);
+                        Turn::Lost
+                    }
+                }
+            }
+        })
+    }
+
+    fn is_shown(&self) -> bool {
+        self.life().is_some_and(LifeCycle::is_running)
+    }
+
+    fn request_exit(&mut self) -> Result<(), HeadsetError> {
+        self.session
+            .as_ref()
+            .map_or(Ok(()), RuntimeSession::request_exit)
+    }
+
+    fn largest_texture(&self) -> Option<u32> {
+        let vulkan = self.vulkan()?;
+        Some(vulkan.gpu.device.limits().max_texture_dimension_2d)
     }
 }
 

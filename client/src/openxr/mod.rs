@@ -15,7 +15,8 @@
 //! virtual time.
 //!
 //! ```no_run
-//! use shadecast_client::openxr::{self, Headset, HeadsetConfig, Turn};
+//! use shadecast_client::openxr::{self, Headset, HeadsetConfig};
+//! use shadecast_client::worn::{Display, IDLE, Turn};
 //! use shadecast_client::{Clock, render::frame_channel};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -26,19 +27,16 @@
 //!     let mut tell = |input| { /* to the network's thread */ };
 //!     match headset.turn(&|| clock.now(), &mut tell)? {
 //!         Turn::Frame(_) => {}
-//!         Turn::Idle | Turn::Lost => std::thread::sleep(openxr::IDLE),
+//!         Turn::Idle | Turn::Lost => std::thread::sleep(IDLE),
 //!         Turn::Exit => return Ok(()),
 //!     }
 //! }
 //! # }
 //! ```
 
-#[cfg(feature = "network")]
-mod client;
 mod error;
 mod hands;
 mod headset;
-mod held;
 mod host;
 mod lifecycle;
 mod moment;
@@ -50,10 +48,8 @@ mod walk;
 
 use ::openxr as xr;
 
-#[cfg(feature = "network")]
-pub use client::{ClientError, HeadsetClient};
 pub use error::HeadsetError;
-pub use headset::{Frame, Headset, HeadsetConfig, IDLE, OnDevice, Turn};
+pub use headset::{Headset, HeadsetConfig};
 pub use lifecycle::{Ending, LifeCycle, Step};
 pub use offers::Offers;
 

@@ -17,15 +17,15 @@ use xr::sys;
 
 use super::error::refused;
 use super::hands::Hands;
-use super::held::Held;
 use super::lifecycle::{LifeCycle, Step};
 use super::moment::display_at;
 use super::offers::Offers;
 use super::space::{EyeLocation, locate_eyes, pose_from_xr, velocity_from_xr};
 use super::swapchain::Swapchain;
-use super::{Ending, Frame, HeadsetError, walk};
+use super::{Ending, HeadsetError, walk};
 use crate::render::vulkan::VulkanGpu;
 use crate::render::{EyeCamera, EyeImages, Gpu, Renderer};
+use crate::worn::{Frame, Held, since};
 use crate::{Drawn, HeadView, Input};
 
 /// Everything that is lost with the session.
@@ -123,15 +123,11 @@ impl RuntimeSession {
         };
         let time = state.predicted_display_time;
         let period = state.predicted_display_period;
-        let mut frame = Frame {
+        let mut frame = Frame::begin(
             began,
-            display_at: display_at(began, runtime_now, time, period),
-            period: Duration::from_nanos(period.as_nanos().max(0) as u64),
-            uploading: Duration::ZERO,
-            drawing: Duration::ZERO,
-            drawn: false,
-            fresh: false,
-        };
+            display_at(began, runtime_now, time, period),
+            Duration::from_nanos(period.as_nanos().max(0) as u64),
+        );
         self.stream.begin().map_err(refused("begins no frame"))?;
         let drawn = if state.should_render {
             self.draw(held, time, &mut frame, now, tell)
@@ -203,7 +199,7 @@ impl RuntimeSession {
         now: &dyn Fn() -> ClientTime,
         tell: &mut dyn FnMut(Input),
     ) -> Result<Option<[EyeLocation; 2]>, HeadsetError> {
-        self.bring_up_to_date(held, frame, now);
+        held.bring_up_to_date(&mut self.renderer, &mut self.is_current, frame, now);
         let stick = if self.life.is_focused() {
             self.hands.sync(&self.session)?;
             self.hands.stick(&self.session)
@@ -223,10 +219,7 @@ impl RuntimeSession {
                 world_from_eye: held.world_from_play.then(eye.base_from_eye),
                 fov: eye.fov,
             });
-            let motion = held
-                .shown
-                .as_ref()
-                .map_or(0.0, |shown| shown.seconds_of_motion(frame.display_at));
+            let motion = held.seconds_of_motion(frame.display_at);
             self.renderer.place_notice(cameras);
             let began = now();
             submit(
@@ -249,34 +242,6 @@ impl RuntimeSession {
             self.report(held, eyes, stick, time, (frame, submitted_at), tell)?;
         }
         Ok(eyes)
-    }
-
-    /// Gives the renderer what has come since the last frame; all of what is
-    /// held, if the session is new.
-    fn bring_up_to_date(
-        &mut self,
-        held: &mut Held,
-        frame: &mut Frame,
-        now: &dyn Fn() -> ClientTime,
-    ) {
-        let newest = held.take_newest(frame.began);
-        let has_newest = newest.is_some();
-        let lacking = || held.shown.clone().filter(|_| !self.is_current);
-        if let Some(world) = newest.or_else(lacking) {
-            let began = now();
-            let uploaded = self.renderer.upload(&world);
-            if uploaded.is_ok() {
-                held.shown = Some(world);
-                frame.fresh = has_newest;
-            }
-            held.tell_upload(uploaded);
-            frame.uploading = since(began, now());
-        }
-        if std::mem::take(&mut held.sky_is_new) || !self.is_current {
-            self.renderer.set_sky(held.sky.as_ref());
-        }
-        self.is_current = true;
-        self.renderer.set_notice(held.notice(frame.began));
     }
 
     /// Tells the server where the head and the hands are, and moves the play
@@ -359,10 +324,6 @@ impl Drop for RuntimeSession {
             .device
             .poll(wgpu::PollType::wait_indefinitely());
     }
-}
-
-fn since(began: ClientTime, now: ClientTime) -> Duration {
-    Duration::from_nanos(now.0.saturating_sub(began.0))
 }
 
 fn submit(

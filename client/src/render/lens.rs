@@ -25,6 +25,32 @@ pub struct LensProfile {
     pub k: [[f32; 2]; 3],
 }
 
+/// One eye's half of a display, behind its lens.
+///
+/// Lengths count from the lens's axis, right and up, in one unit, by which `k` goes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EyeLens {
+    /// Where the half's sides are: left, right, up, down.
+    pub display: [f32; 4],
+    /// Where those of the undistorted picture are.
+    pub picture: [f32; 4],
+    /// As [`LensProfile::k`].
+    pub k: [[f32; 2]; 3],
+}
+
+impl EyeLens {
+    /// The same for the other eye.
+    #[must_use]
+    pub fn mirrored(self) -> Self {
+        let mirror = |[left, right, up, down]: [f32; 4]| [-right, -left, up, down];
+        Self {
+            display: mirror(self.display),
+            picture: mirror(self.picture),
+            k: self.k,
+        }
+    }
+}
+
 /// Why a lens profile is refused.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum LensError {
@@ -54,6 +80,20 @@ impl LensProfile {
             centre: [0.0; 2],
             k: [[0.076, 0.018], [0.080, 0.020], [0.085, 0.022]],
         }
+    }
+
+    /// Both lenses before pictures of `aspect` times their height, which fill the
+    /// display.
+    #[must_use]
+    pub fn eyes(self, aspect: f32) -> [EyeLens; 2] {
+        let [x, y] = self.centre;
+        let sides = [-aspect - x, aspect - x, 1.0 - y, -1.0 - y];
+        let left = EyeLens {
+            display: sides,
+            picture: sides,
+            k: self.k,
+        };
+        [left, left.mirrored()]
     }
 
     /// The profile, if a lens can be like that.
@@ -112,10 +152,10 @@ impl Viewport {
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub(super) struct LensImmediates {
-    pub(super) centre: [f32; 2],
-    pub(super) aspect: f32,
-    pub(super) padding: f32,
+    pub(super) display: [f32; 4],
+    pub(super) picture: [f32; 4],
     pub(super) k: [[f32; 2]; 3],
+    pub(super) padding: [f32; 2],
 }
 
 /// Draws both eyes, bent, side by side.
@@ -123,8 +163,7 @@ pub(super) struct LensImmediates {
 pub struct LensPass {
     pipeline: wgpu::RenderPipeline,
     eyes: [wgpu::BindGroup; 2],
-    aspect: f32,
-    profile: LensProfile,
+    lenses: [EyeLens; 2],
 }
 
 impl LensPass {
@@ -134,7 +173,7 @@ impl LensPass {
         device: &wgpu::Device,
         source: &EyeImages,
         format: wgpu::TextureFormat,
-        profile: LensProfile,
+        lenses: [EyeLens; 2],
     ) -> Self {
         let layout = eye_layout(device);
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
@@ -159,12 +198,10 @@ impl LensPass {
                 ],
             })
         });
-        let size = source.texture().size();
         Self {
             pipeline: pipeline(device, &layout, format),
             eyes,
-            aspect: size.width as f32 / size.height as f32,
-            profile,
+            lenses,
         }
     }
 
@@ -178,13 +215,12 @@ impl LensPass {
     ) {
         let mut pass = cover_pass(encoder, "lens", target);
         pass.set_pipeline(&self.pipeline);
-        let [x, y] = self.profile.centre;
-        for ((eye, centre), view) in self.eyes.iter().zip([[x, y], [-x, y]]).zip(viewports) {
+        for ((eye, lens), view) in self.eyes.iter().zip(self.lenses).zip(viewports) {
             let lens = LensImmediates {
-                centre,
-                aspect: self.aspect,
-                padding: 0.0,
-                k: self.profile.k,
+                display: lens.display,
+                picture: lens.picture,
+                k: lens.k,
+                padding: [0.0; 2],
             };
             pass.set_viewport(
                 view.x as f32,

@@ -19,10 +19,12 @@ mod lens;
 mod mesh;
 #[cfg(feature = "notice")]
 mod notice;
+mod optics;
 mod pipelines;
 mod planes;
 mod readback;
 mod renderer;
+mod screen;
 mod shrink;
 mod sky;
 #[cfg(test)]
@@ -35,6 +37,8 @@ pub(crate) use eyes::NEAR;
 pub use eyes::{EyeCamera, EyeImages};
 pub use gpu::{Gpu, GpuError, Stereo};
 pub use handover::{FrameReceiver, FrameSender, frame_channel};
-pub use lens::{LensError, LensPass, LensProfile, Viewport};
+pub use lens::{EyeLens, LensError, LensPass, LensProfile, Viewport};
+pub use optics::{Eyes, Optics, OpticsError, PhoneScreen};
 pub use readback::{Pixels, Readback, ReadbackError};
 pub use renderer::{Renderer, RendererConfig, UploadError};
+pub use screen::{Screen, ScreenError};

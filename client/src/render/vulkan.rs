@@ -96,6 +96,8 @@ pub enum VulkanError {
 pub struct VulkanGpu {
     /// What to draw with.
     pub gpu: Gpu,
+    /// Lets windows be drawn into.
+    pub api: wgpu::Instance,
     /// The instance. Valid for as long as any part of `gpu`.
     pub instance: vk::Instance,
     /// As `instance`.
@@ -209,11 +211,11 @@ impl VulkanGpu {
         .map_err(|error| VulkanError::Unusable(error.to_string()))?;
         // SAFETY: the adapter is one of the instance, the device one of the
         // adapter, opened with this description.
-        let (adapter, opened) = unsafe {
-            let instance = wgpu::Instance::from_hal::<hal::Api>(instance);
-            let adapter = instance.create_adapter_from_hal(exposed);
+        let (api, adapter, opened) = unsafe {
+            let api = wgpu::Instance::from_hal::<hal::Api>(instance);
+            let adapter = api.create_adapter_from_hal(exposed);
             let opened = adapter.create_device_from_hal(open, &demands);
-            (adapter, opened)
+            (api, adapter, opened)
         };
         let (device, queue) = opened.map_err(|error| VulkanError::Unusable(error.to_string()))?;
         Ok(Self {
@@ -223,6 +225,7 @@ impl VulkanGpu {
                 queue,
                 stereo,
             },
+            api,
             instance: instance_raw,
             physical,
             device: device_raw,

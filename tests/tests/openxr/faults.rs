@@ -1,7 +1,8 @@
 //! What goes wrong in a headset, and the state in which each thing ends.
 
 use shadecast_client::Input;
-use shadecast_client::openxr::{HeadsetConfig, Turn, api::SessionState as S};
+use shadecast_client::openxr::{HeadsetConfig, api::SessionState as S};
+use shadecast_client::worn::{Display, Turn};
 use shadecast_simulated_runtime::sys::{Posef, Quaternionf, Result as R, Vector3f};
 use shadecast_simulated_runtime::{Fault, Log, Script};
 

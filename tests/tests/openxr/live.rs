@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use shadecast_client::openxr::{self, Turn};
+use shadecast_client::worn::{Display, IDLE, Turn};
 use shadecast_client::{ClientFrame, Input};
 use shadecast_protocol::{ClientTime, Pose};
 use shadecast_server::scene::courtyard;
@@ -74,7 +74,7 @@ fn a_thousand_frames_show_the_servers_world_where_the_eyes_are() {
                 });
             }
         } else {
-            rig.runtime.pass(openxr::IDLE);
+            rig.runtime.pass(IDLE);
         }
         loopback
             .run_until(elapsed(rig.runtime.now()))

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
-use shadecast_client::openxr::{self, Headset, HeadsetConfig, HeadsetError, Turn, api};
+use shadecast_client::openxr::{Headset, HeadsetConfig, HeadsetError, api};
 use shadecast_client::render::{
     EyeCamera, EyeImages, FrameSender, Gpu, Pixels, Readback, Renderer, RendererConfig,
     frame_channel,
 };
+use shadecast_client::worn::{Display, IDLE, Turn};
 use shadecast_client::{
     ClientFrame, ClientTiming, DecodedPicture, DrawVertex, HeadView, Input, YuvPicture,
 };
@@ -80,7 +81,7 @@ impl Rig {
             })
             .expect("the headset goes on");
         if !matches!(turn, Turn::Frame(_)) {
-            self.runtime.pass(openxr::IDLE);
+            self.runtime.pass(IDLE);
         }
         turn
     }

@@ -1,6 +1,7 @@
 //! A network that stalls: the world stays, and a notice hangs in it.
 
 use shadecast_client::Status;
+use shadecast_client::worn::Display;
 use shadecast_simulated_runtime::{Image, Script};
 
 use crate::rig::{Rig, pixel, still_head, wall};

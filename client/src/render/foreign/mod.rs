@@ -12,6 +12,7 @@
 //! its decoder when the GPU is done with it.
 
 mod device;
+mod hardware_buffer;
 mod image;
 mod pass;
 mod pipeline;
@@ -35,6 +36,7 @@ use pipeline::Pipeline;
 use ring::{RING, Ring};
 
 pub use device::RawDevice;
+pub use hardware_buffer::{BufferParts, HardwareBuffers};
 pub use image::{ImageParts, SourceImage};
 pub use sampler::{PictureKind, SourceSampler};
 

@@ -9,7 +9,7 @@ use crate::render::{LensError, LensPass, LensProfile, Viewport};
 /// A face-on quad through a lens: both eyes side by side.
 fn through(bench: &Bench, profile: LensProfile) -> Pixels {
     let device = &bench.gpu.device;
-    let lens = LensPass::new(device, &bench.eyes, FORMAT, profile);
+    let lens = LensPass::new(device, &bench.eyes, FORMAT, profile.eyes(1.0));
     let target = device.create_texture(&wgpu::TextureDescriptor {
         label: None,
         size: wgpu::Extent3d {

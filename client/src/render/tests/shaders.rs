@@ -47,9 +47,8 @@ fn immediates_are_laid_out_as_the_host_writes_them() {
     let lens = validated(include_str!("../lens.wgsl"), immediates);
     let k = offset_of!(LensImmediates, k) as u32;
     let offsets = vec![
-        offset_of!(LensImmediates, centre) as u32,
-        offset_of!(LensImmediates, aspect) as u32,
-        offset_of!(LensImmediates, padding) as u32,
+        offset_of!(LensImmediates, display) as u32,
+        offset_of!(LensImmediates, picture) as u32,
         k,
         k + 8,
         k + 16,

@@ -1,12 +1,13 @@
-//! What a headset holds of the world, whatever becomes of its runtime and of
-//! the network: both come back, and the world is still there.
+//! What a display holds of the world, whatever becomes of the device that it draws
+//! with and of the network: both come back, and the world is still there.
 
 use std::sync::Arc;
 use std::time::Duration;
 
 use shadecast_protocol::{ClientTime, Pose, Sky, Welcome};
 
-use crate::render::{FrameReceiver, UploadError};
+use super::{Frame, since};
+use crate::render::{FrameReceiver, Renderer, UploadError};
 use crate::{ClientFrame, Status};
 
 /// A network that brings nothing for this long has stalled, and the user is told.
@@ -14,29 +15,29 @@ const STALL: Duration = Duration::from_millis(500);
 
 /// The newest frame and what belongs to it.
 #[derive(Debug)]
-pub(super) struct Held {
+pub struct Held {
     frames: FrameReceiver,
-    pub(super) shown: Option<Arc<ClientFrame>>,
-    pub(super) sky: Option<Sky>,
+    pub(crate) shown: Option<Arc<ClientFrame>>,
+    sky: Option<Sky>,
     /// The sky has not been drawn yet.
-    pub(super) sky_is_new: bool,
+    sky_is_new: bool,
     /// Where the server put the play space.
     home: Option<Pose>,
     /// Where it is by now.
-    pub(super) world_from_play: Pose,
+    pub(crate) world_from_play: Pose,
     /// When something last came, or was first waited for.
     heard_at: Option<ClientTime>,
     /// When it was last asked for something new.
     asked_at: Option<ClientTime>,
     status: &'static str,
-    /// Said by whoever runs the headset, and shown until it is taken back.
+    /// Said by whoever runs the display, and shown until it is taken back.
     said: Option<String>,
     /// Why the newest frame is not shown.
     unshown: Option<String>,
 }
 
 impl Held {
-    pub(super) fn new(frames: FrameReceiver) -> Self {
+    pub(crate) fn new(frames: FrameReceiver) -> Self {
         Self {
             frames,
             shown: None,
@@ -54,7 +55,7 @@ impl Held {
 
     /// A session with the server begins. A user who walked away from where the
     /// server puts the play space stays there when the server comes back.
-    pub(super) fn welcome(&mut self, welcome: &Welcome) {
+    pub(crate) fn welcome(&mut self, welcome: &Welcome) {
         if self.home != Some(welcome.world_from_play) {
             self.home = Some(welcome.world_from_play);
             self.world_from_play = welcome.world_from_play;
@@ -63,12 +64,12 @@ impl Held {
         self.sky_is_new = true;
     }
 
-    pub(super) fn say(&mut self, sentence: Option<String>) {
+    pub(crate) fn say(&mut self, sentence: Option<String>) {
         self.said = sentence;
     }
 
     /// The newest frame was taken over, or could not be; the log hears of it once.
-    pub(super) fn tell_upload(&mut self, uploaded: Result<(), UploadError>) {
+    fn tell_upload(&mut self, uploaded: Result<(), UploadError>) {
         let why = uploaded.err().map(|error| error.to_string());
         if let Some(why) = &why
             && self.unshown.as_ref() != Some(why)
@@ -78,7 +79,7 @@ impl Held {
         self.unshown = why;
     }
 
-    pub(super) fn take_status(&mut self, status: &Status) {
+    pub(crate) fn take_status(&mut self, status: &Status) {
         self.status = match status {
             Status::Connecting | Status::Resting => "Connecting to the server",
             Status::Filling | Status::Recovering(_) | Status::Streaming => {
@@ -89,7 +90,7 @@ impl Held {
     }
 
     /// What is to be shown instead of `shown`, if something came.
-    pub(super) fn take_newest(&mut self, now: ClientTime) -> Option<Arc<ClientFrame>> {
+    fn take_newest(&mut self, now: ClientTime) -> Option<Arc<ClientFrame>> {
         // Nobody looked for a while, and so nothing has stalled.
         let looked_away = self
             .asked_at
@@ -103,8 +104,43 @@ impl Held {
         Some(frame)
     }
 
+    /// Gives the renderer what has come since the last frame; all of what is held, if
+    /// the renderer is new and `is_current` is false.
+    pub(crate) fn bring_up_to_date(
+        &mut self,
+        renderer: &mut Renderer,
+        is_current: &mut bool,
+        frame: &mut Frame,
+        now: &dyn Fn() -> ClientTime,
+    ) {
+        let newest = self.take_newest(frame.began);
+        let has_newest = newest.is_some();
+        let lacking = || self.shown.clone().filter(|_| !*is_current);
+        if let Some(world) = newest.or_else(lacking) {
+            let began = now();
+            let uploaded = renderer.upload(&world);
+            if uploaded.is_ok() {
+                self.shown = Some(world);
+                frame.fresh = has_newest;
+            }
+            self.tell_upload(uploaded);
+            frame.uploading = since(began, now());
+        }
+        if std::mem::take(&mut self.sky_is_new) || !*is_current {
+            renderer.set_sky(self.sky.as_ref());
+        }
+        *is_current = true;
+        renderer.set_notice(self.notice(frame.began));
+    }
+
+    /// For how long the objects have moved on at a time.
+    pub(crate) fn seconds_of_motion(&self, at: ClientTime) -> f32 {
+        let shown = self.shown.as_ref();
+        shown.map_or(0.0, |shown| shown.seconds_of_motion(at))
+    }
+
     /// What the user is told at this time, if anything.
-    pub(super) fn notice(&self, now: ClientTime) -> Option<&str> {
+    pub(crate) fn notice(&self, now: ClientTime) -> Option<&str> {
         if let Some(said) = &self.said {
             return Some(said);
         }

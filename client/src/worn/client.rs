@@ -1,32 +1,35 @@
-//! A headset together with the thread that talks to its server: what desktop
-//! and Android run, each with its own loader, decoder and user.
+//! A display together with the thread that talks to its server: what desktop
+//! and Android run, each with its own display, decoder and user.
 
 use std::time::Duration;
 
-use ::openxr as xr;
 use shadecast_protocol::ClientTime;
 use shadecast_transport::ServerLine;
 use thiserror::Error;
 
-use super::{Headset, HeadsetConfig, HeadsetError, Turn};
+use super::{Display, Turn};
 use crate::network::{Event, Network};
-use crate::render::{FrameSender, frame_channel};
+use crate::render::{FrameReceiver, FrameSender, frame_channel};
+use crate::settings::NoServer;
 use crate::{Clock, Decoder, Failure, Input};
 
-/// A headset that wants no pictures for this long is not worn, and the server is
+/// A display that wants no pictures for this long is not worn, and the server is
 /// left: it has nothing to compute then. A glance at one's watch is shorter.
 const REST_AFTER: Duration = Duration::from_secs(10);
+/// How often a server is looked for while there is none: whoever names one sees the
+/// scene at once.
+const LOOK_AGAIN: Duration = Duration::from_secs(1);
 /// How long a final sentence stays before the eyes.
 const READING: Duration = Duration::from_secs(8);
-/// How long a runtime is given to let the user leave.
+/// How long a display is given to let the user leave.
 const LEAVING: Duration = Duration::from_secs(3);
 
 /// Why a client ends.
 #[derive(Debug, Error)]
-pub enum ClientError {
-    /// The headset.
+pub enum ClientError<E: std::error::Error + 'static> {
+    /// The display.
     #[error(transparent)]
-    Headset(#[from] HeadsetError),
+    Display(E),
     /// The session with the server.
     #[error(transparent)]
     Session(#[from] Failure),
@@ -36,58 +39,40 @@ pub enum ClientError {
 }
 
 /// A running client.
-pub struct HeadsetClient<P = ()> {
-    headset: Headset<P>,
+pub struct HeadsetClient<D> {
+    display: D,
     /// None until the server is known.
     network: Option<Network>,
     /// The network's end of the hand-over, until it has it.
     frames: Option<FrameSender>,
+    /// When a server was last looked for.
+    sought_at: Option<ClientTime>,
     clock: Clock,
     /// By whoever runs the client.
     is_paused: bool,
-    /// Since when the headset wants no pictures.
+    /// Since when the display wants no pictures.
     idle_since: Option<ClientTime>,
     /// Whether the session with the server rests.
     rests: bool,
     /// Since when a failure is shown.
     failed: Option<(ClientTime, Failure)>,
-    /// Since when the runtime is asked to let the user leave.
+    /// Since when the display is asked to let the user leave.
     leaving: Option<ClientTime>,
 }
 
-impl<P: xr::PlatformInfo> HeadsetClient<P> {
-    /// Opens the headset and begins to reach for the server, whose pictures are
-    /// at most `largest_atlas` texels wide and high.
+impl<D: Display> HeadsetClient<D> {
+    /// Opens the display, which shows what comes from the end that it is given; its
+    /// user waits for [`connect`](Self::connect).
     ///
     /// # Errors
-    /// When there is no headset that can be drawn for, or the system has no threads.
-    pub fn start(
-        entry: xr::Entry,
-        platform: P,
-        config: HeadsetConfig,
-        line: ServerLine,
-        decoder: impl Decoder + Send + 'static,
-        largest_atlas: u16,
-    ) -> Result<Self, ClientError> {
-        let mut this = Self::open(entry, platform, config)?;
-        this.connect(line, decoder, largest_atlas)?;
-        Ok(this)
-    }
-
-    /// Opens the headset; its user waits for [`connect`](Self::connect).
-    ///
-    /// # Errors
-    /// When there is no headset that can be drawn for.
-    pub fn open(
-        entry: xr::Entry,
-        platform: P,
-        config: HeadsetConfig,
-    ) -> Result<Self, HeadsetError> {
+    /// When there is none that can be drawn for.
+    pub fn open<E>(display: impl FnOnce(FrameReceiver) -> Result<D, E>) -> Result<Self, E> {
         let (sender, frames) = frame_channel();
         Ok(Self {
-            headset: Headset::open(entry, platform, config, frames)?,
+            display: display(frames)?,
             network: None,
             frames: Some(sender),
+            sought_at: None,
             clock: Clock::start(),
             is_paused: false,
             idle_since: None,
@@ -97,8 +82,8 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
         })
     }
 
-    /// Begins to reach for the server, as in [`start`](Self::start). A second
-    /// server is not reached for.
+    /// Begins to reach for the server, whose pictures are at most `largest_atlas`
+    /// texels wide and high. A second server is not reached for.
     ///
     /// # Errors
     /// The system has no threads.
@@ -107,46 +92,75 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
         line: ServerLine,
         decoder: impl Decoder + Send + 'static,
         largest_atlas: u16,
-    ) -> Result<(), ClientError> {
+    ) -> Result<(), ClientError<D::Error>> {
         let Some(frames) = self.frames.take() else {
             return Ok(());
         };
-        let device_limit = self.headset.vulkan().map_or(u32::MAX, |vulkan| {
-            vulkan.gpu.device.limits().max_texture_dimension_2d
-        });
-        let largest = device_limit.min(largest_atlas.into()) as u16;
+        let limit = self.display.largest_texture().unwrap_or(u32::MAX);
+        let largest = limit.min(largest_atlas.into()) as u16;
         let network = Network::start(line, largest, self.clock, decoder, frames)?;
         self.network = Some(network);
         Ok(())
     }
 
+    /// Looks for a server every second while there is none, and begins to reach for
+    /// the first that is found, as in [`connect`](Self::connect). Its user is told
+    /// why there is none.
+    ///
+    /// # Errors
+    /// The system has no threads.
+    pub fn seek<C: Decoder + Send + 'static>(
+        &mut self,
+        find: impl FnOnce() -> Result<ServerLine, NoServer>,
+        decoder: impl FnOnce() -> C,
+        largest_atlas: u16,
+    ) -> Result<(), ClientError<D::Error>> {
+        let now = self.clock.now();
+        let soon = |before| !is_over(before, now, LOOK_AGAIN);
+        if self.network.is_some() || self.sought_at.is_some_and(soon) {
+            return Ok(());
+        }
+        self.sought_at = Some(now);
+        match find() {
+            Ok(line) => {
+                tracing::info!("server {}", line.address);
+                self.say(None);
+                self.connect(line, decoder(), largest_atlas)
+            }
+            Err(error) => {
+                self.say(Some(error.to_string()));
+                Ok(())
+            }
+        }
+    }
+
     /// Shows a sentence in the world, until it is taken back.
     pub fn say(&mut self, sentence: Option<String>) {
-        self.headset
+        self.display
             .say(sentence.map(|sentence| capitalised(&sentence)));
     }
 
     /// While it is paused, the client has left its server, and keeps the world. It
-    /// does so by itself while the headset is not worn.
+    /// does so by itself while nobody looks.
     pub fn set_paused(&mut self, is_paused: bool) {
         self.is_paused = is_paused;
     }
 
-    /// A turn of the headset ([`Headset::turn`]); `hear` is told what the
-    /// network's thread says.
+    /// A turn of the display ([`Display::turn`]); `hear` is told what the network's
+    /// thread says.
     ///
     /// # Errors
-    /// When the headset can no longer be used. When the session with the server
+    /// When the display can no longer be used. When the session with the server
     /// failed for good: the user has had time to read why, and has left.
-    pub fn turn(&mut self, hear: &mut dyn FnMut(&Event)) -> Result<Turn, ClientError> {
+    pub fn turn(&mut self, hear: &mut dyn FnMut(&Event)) -> Result<Turn, ClientError<D::Error>> {
         let events = self.network.iter().flat_map(|one| one.events.try_iter());
         for event in events {
             hear(&event);
             match event {
-                Event::Welcomed(welcome) => self.headset.welcome(&welcome),
-                Event::Status(status) => self.headset.take_status(&status),
+                Event::Welcomed(welcome) => self.display.welcome(&welcome),
+                Event::Status(status) => self.display.take_status(&status),
                 Event::Failed(failure) => {
-                    self.headset.say(Some(capitalised(&failure.to_string())));
+                    self.display.say(Some(capitalised(&failure.to_string())));
                     self.failed = Some((self.clock.now(), failure));
                 }
             }
@@ -160,13 +174,17 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
         }
         let clock = self.clock;
         let network = &self.network;
-        let mut turn = self.headset.turn(&|| clock.now(), &mut |input| {
+        let mut tell = |input| {
             if let Some(network) = network {
                 network.tell(input);
             }
-        })?;
+        };
+        let mut turn = self
+            .display
+            .turn(&|| clock.now(), &mut tell)
+            .map_err(ClientError::Display)?;
         if let Some(since) = self.leaving
-            && (is_over(since, now, LEAVING) || !self.is_shown() && turn == Turn::Idle)
+            && (is_over(since, now, LEAVING) || !self.display.is_shown() && turn == Turn::Idle)
         {
             turn = Turn::Exit;
         }
@@ -181,7 +199,7 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
     /// Lets the session with the server rest while nobody looks.
     fn rest_or_wake(&mut self, now: ClientTime) {
         self.idle_since = match self.idle_since {
-            _ if self.is_shown() => None,
+            _ if self.display.is_shown() => None,
             since => since.or(Some(now)),
         };
         let is_off = |since| is_over(since, now, REST_AFTER);
@@ -194,20 +212,15 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
         }
     }
 
-    /// Whether the runtime wants pictures.
-    fn is_shown(&self) -> bool {
-        self.headset.life().is_some_and(|life| life.is_running())
-    }
-
-    /// Asks the runtime to let the user leave; a later turn is [`Turn::Exit`].
+    /// Asks the display to let the user leave; a later turn is [`Turn::Exit`].
     ///
     /// # Errors
-    /// When the runtime refuses.
-    pub fn leave(&mut self) -> Result<(), HeadsetError> {
+    /// When it refuses.
+    pub fn leave(&mut self) -> Result<(), ClientError<D::Error>> {
         if self.leaving.is_none() {
             self.leaving = Some(self.clock.now());
-            if self.is_shown() {
-                self.headset.request_exit()?;
+            if self.display.is_shown() {
+                self.display.request_exit().map_err(ClientError::Display)?;
             }
         }
         Ok(())
@@ -215,8 +228,13 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
 
     /// What is worn.
     #[must_use]
-    pub fn headset(&self) -> &Headset<P> {
-        &self.headset
+    pub fn display(&self) -> &D {
+        &self.display
+    }
+
+    /// As [`display`](Self::display), to tell it something.
+    pub fn display_mut(&mut self) -> &mut D {
+        &mut self.display
     }
 
     /// What talks to the server; none before it is known.
@@ -229,6 +247,18 @@ impl<P: xr::PlatformInfo> HeadsetClient<P> {
     #[must_use]
     pub fn clock(&self) -> Clock {
         self.clock
+    }
+}
+
+/// Leaves a trace of what the network's thread says.
+pub fn log(event: &Event) {
+    match event {
+        Event::Welcomed(welcome) => {
+            let [width, height] = welcome.atlas_size;
+            tracing::info!("welcomed: an atlas of {width}x{height} texels");
+        }
+        Event::Status(status) => tracing::info!("{status:?}"),
+        Event::Failed(failure) => tracing::error!("the session is over: {failure}"),
     }
 }
 
