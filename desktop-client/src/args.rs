@@ -213,7 +213,7 @@ mod tests {
         let phone = parse(&["--lens", "cardboard"]).unwrap();
         let [left, right] = phone.eyes();
         assert!(
-            left.fov.left < left.fov.right * -1.05,
+            left.fov.left < left.fov.right * -1.01,
             "further to the outside"
         );
         assert_eq!(left.fov.left, -right.fov.right);
