@@ -20,7 +20,7 @@ use crate::{
     prediction::Prediction,
     scene::{Material, Scene, SceneFacts},
     snake::SnakeError,
-    visibility::Visibility,
+    visibility::{Recent, Visibility},
 };
 
 /// Samples over which a diffuse texel's mean runs at most: beyond it the error
@@ -116,6 +116,7 @@ pub struct Pipeline {
     gpu_scene: GpuScene,
     scene: PatchedScene,
     visibility: Visibility,
+    recent: Recent,
     packer: Packer,
     schedule: Schedule,
     light: Light,
@@ -144,6 +145,7 @@ impl Pipeline {
     ) -> Result<Self, FrameError> {
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
         let pixels = visibility.pixels();
+        let recent = Recent::new(&gpu, scene.patches.len() as u32, pixels)?;
         let packer = Packer::new(&gpu, &gpu_scene, &scene, size, superblock, pixels)?;
         let light = Light::new(&gpu, &gpu_scene, size, scene.method)?;
         let picture = PictureConversion::new(&gpu, light.shown(), size)?;
@@ -160,6 +162,7 @@ impl Pipeline {
             gpu_scene,
             scene,
             visibility,
+            recent,
             packer,
             light,
             picture,
@@ -262,6 +265,10 @@ impl Pipeline {
         let objects_after = |after| self.scene.scene.poses(order.scene_time + after);
         self.visibility
             .record(gpu, &mut encoder, gpu_scene, &viewpoints, objects_after);
+        if order.new_client {
+            self.recent.forget(&mut encoder);
+        }
+        self.recent.recall(&mut encoder);
         let placed = (self.packer).place(gpu, gpu_scene, encoder, &eyes, pixels_per_radian)?;
         stages.visibility = lap();
 
