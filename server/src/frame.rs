@@ -81,8 +81,12 @@ pub struct FrameStats {
 /// Where a frame's time went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stages {
-    /// Id pictures, marking, and where patches are shaded: one submission.
+    /// Id pictures, marking, and where patches are shaded: one submission, but for
+    /// what is timed apart.
     pub visibility: Duration,
+    /// Where patches are shaded, where that is timed apart
+    /// ([`Pipeline::time_packing_apart`]); else none.
+    pub packing: Duration,
     /// What the client must be told of that.
     pub atlas: Duration,
     /// Path tracing.
@@ -125,6 +129,7 @@ pub struct Pipeline {
     known: Known,
     exposure: f32,
     has_sun: bool,
+    packing_apart: bool,
     visible: Vec<VisiblePatch>,
 }
 
@@ -168,6 +173,7 @@ impl Pipeline {
             picture,
             encoder,
             exposure,
+            packing_apart: false,
             visible: Vec::new(),
         })
     }
@@ -212,6 +218,12 @@ impl Pipeline {
         self.light.make_even(&self.gpu);
     }
 
+    /// From now on what is visible is waited for before it is given slots, so that either
+    /// has a time: only to tell what they cost.
+    pub fn time_packing_apart(&mut self) {
+        self.packing_apart = true;
+    }
+
     /// How often stages of the light run from now on.
     pub fn set_repeats(&mut self, repeats: Repeats) {
         self.light.set_repeats(repeats);
@@ -224,7 +236,7 @@ impl Pipeline {
     }
 
     /// Makes a frame. `clock` tells the time for the stages' durations, and
-    /// nothing depends on it.
+    /// nothing depends on it; it is asked at the beginning and after each stage.
     ///
     /// # Errors
     /// When the GPU or the encoder fails. What the client was to be told is
@@ -269,8 +281,21 @@ impl Pipeline {
             self.recent.forget(&mut encoder);
         }
         self.recent.recall(&mut encoder);
+        if self.packing_apart {
+            gpu.queue.submit([encoder.finish()]);
+            gpu.wait()?;
+            stages.visibility = lap();
+            encoder = gpu
+                .device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        }
         let placed = (self.packer).place(gpu, gpu_scene, encoder, &eyes, pixels_per_radian)?;
-        stages.visibility = lap();
+        let spent = lap();
+        if self.packing_apart {
+            stages.packing = spent;
+        } else {
+            stages.visibility = spent;
+        }
 
         let mut moved = placed.moved.iter().peekable();
         for placement in &placed.placements {
