@@ -74,17 +74,19 @@ impl Even {
         Ok(even)
     }
 
-    /// The same whose light is no longer even: what the server would do, with about so
-    /// many paths in each frame.
-    pub(crate) fn traced(
-        scene: &Scene,
-        method: Method,
-        size: [u16; 2],
-        paths: u32,
-    ) -> Result<Self> {
-        let integrator = Integrator::with_bounces(DEFAULT_BOUNCES);
-        let even = Self::build(scene, method, size, integrator)?;
-        Ok(Self { paths, ..even })
+    /// The same whose light is no longer even, but traced as the server does.
+    pub(crate) fn traced(scene: &Scene, method: Method, size: [u16; 2]) -> Result<Self> {
+        Self::build(
+            scene,
+            method,
+            size,
+            Integrator::with_bounces(DEFAULT_BOUNCES),
+        )
+    }
+
+    /// Frames have about so many paths from now on; at first they have none.
+    pub(crate) fn set_paths(&mut self, paths: u32) {
+        self.paths = paths;
     }
 
     fn build(

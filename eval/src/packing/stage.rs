@@ -19,8 +19,10 @@ use crate::{
 
 /// Frames that are timed, after a first one that places everything and for which
 /// drivers compile.
-const FRAMES: u32 = 6;
-const QUICK_FRAMES: u32 = 3;
+const FRAMES: u32 = 3;
+const QUICK_FRAMES: u32 = 1;
+/// The first frame has this part of the paths.
+const COARSE: u32 = 64;
 /// Of the light's stage, that a packer's may take.
 const MOST: f64 = 0.15;
 
@@ -55,12 +57,14 @@ pub(super) fn measure(
     texels: u64,
     quick: bool,
 ) -> Result<Row> {
-    let paths = u32::try_from(texels).unwrap_or(u32::MAX);
-    let mut server = Even::traced(scene, method, size, paths)?;
+    let budget = u32::try_from(texels).unwrap_or(u32::MAX);
+    let mut server = Even::traced(scene, method, size)?;
     let frames = if quick { QUICK_FRAMES } else { FRAMES };
     let (mut packing, mut light) = (Spent::default(), Spent::default());
     let (mut visible, mut texels, mut paths) = (0.0, 0.0, 0.0);
     for frame in 0..=frames {
+        // The first one may be coarse.
+        server.set_paths(if frame == 0 { budget / COARSE } else { budget });
         let made = server.frame(&|seconds| trace::head(scene, seconds), frame)?;
         if frame == 0 {
             continue;
