@@ -37,8 +37,8 @@ enum Command {
     ///
     /// The allocator on the GPU, its twin on the CPU and a quadtree along the same
     /// walk, and what columns, block stacks and resets are worth. Fails where GPU and
-    /// twin differ. Writes packing.md, packing-speed.csv, packing-kernels.csv and
-    /// packing-strategies.csv.
+    /// twin differ. Writes packing.md, packing-stage.csv, packing-speed.csv,
+    /// packing-kernels.csv and packing-strategies.csv.
     Packing(packing::Options),
     /// Measures the error of what is displayed while a head or a lamp moves.
     ///

@@ -20,7 +20,7 @@ use crate::{
     prediction::Prediction,
     scene::{Material, Scene, SceneFacts},
     snake::SnakeError,
-    visibility::Visibility,
+    visibility::{Recent, Visibility},
 };
 
 /// Samples over which a diffuse texel's mean runs at most: beyond it the error
@@ -81,8 +81,12 @@ pub struct FrameStats {
 /// Where a frame's time went.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Stages {
-    /// Id pictures, marking, and where patches are shaded: one submission.
+    /// Id pictures, marking, and where patches are shaded: one submission, but for
+    /// what is timed apart.
     pub visibility: Duration,
+    /// Where patches are shaded, where that is timed apart
+    /// ([`Pipeline::time_packing_apart`]); else none.
+    pub packing: Duration,
     /// What the client must be told of that.
     pub atlas: Duration,
     /// Path tracing.
@@ -116,6 +120,7 @@ pub struct Pipeline {
     gpu_scene: GpuScene,
     scene: PatchedScene,
     visibility: Visibility,
+    recent: Recent,
     packer: Packer,
     schedule: Schedule,
     light: Light,
@@ -124,6 +129,7 @@ pub struct Pipeline {
     known: Known,
     exposure: f32,
     has_sun: bool,
+    packing_apart: bool,
     visible: Vec<VisiblePatch>,
 }
 
@@ -144,6 +150,7 @@ impl Pipeline {
     ) -> Result<Self, FrameError> {
         let visibility = Visibility::new(&gpu, &gpu_scene, &scene)?;
         let pixels = visibility.pixels();
+        let recent = Recent::new(&gpu, scene.patches.len() as u32, pixels)?;
         let packer = Packer::new(&gpu, &gpu_scene, &scene, size, superblock, pixels)?;
         let light = Light::new(&gpu, &gpu_scene, size, scene.method)?;
         let picture = PictureConversion::new(&gpu, light.shown(), size)?;
@@ -160,11 +167,13 @@ impl Pipeline {
             gpu_scene,
             scene,
             visibility,
+            recent,
             packer,
             light,
             picture,
             encoder,
             exposure,
+            packing_apart: false,
             visible: Vec::new(),
         })
     }
@@ -209,6 +218,12 @@ impl Pipeline {
         self.light.make_even(&self.gpu);
     }
 
+    /// From now on what is visible is waited for before it is given slots, so that either
+    /// has a time: only to tell what they cost.
+    pub fn time_packing_apart(&mut self) {
+        self.packing_apart = true;
+    }
+
     /// How often stages of the light run from now on.
     pub fn set_repeats(&mut self, repeats: Repeats) {
         self.light.set_repeats(repeats);
@@ -221,7 +236,7 @@ impl Pipeline {
     }
 
     /// Makes a frame. `clock` tells the time for the stages' durations, and
-    /// nothing depends on it.
+    /// nothing depends on it; it is asked at the beginning and after each stage.
     ///
     /// # Errors
     /// When the GPU or the encoder fails. What the client was to be told is
@@ -262,8 +277,25 @@ impl Pipeline {
         let objects_after = |after| self.scene.scene.poses(order.scene_time + after);
         self.visibility
             .record(gpu, &mut encoder, gpu_scene, &viewpoints, objects_after);
+        if order.new_client {
+            self.recent.forget(&mut encoder);
+        }
+        self.recent.recall(&mut encoder);
+        if self.packing_apart {
+            gpu.queue.submit([encoder.finish()]);
+            gpu.wait()?;
+            stages.visibility = lap();
+            encoder = gpu
+                .device
+                .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+        }
         let placed = (self.packer).place(gpu, gpu_scene, encoder, &eyes, pixels_per_radian)?;
-        stages.visibility = lap();
+        let spent = lap();
+        if self.packing_apart {
+            stages.packing = spent;
+        } else {
+            stages.visibility = spent;
+        }
 
         let mut moved = placed.moved.iter().peekable();
         for placement in &placed.placements {

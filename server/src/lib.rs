@@ -34,4 +34,4 @@ pub use gpu::{Gpu, GpuError, GpuScene, Integrator};
 pub use prediction::Prediction;
 pub use session::{Hands, Input, Output, Session, SessionConfig};
 pub use shadecast_shaders::picture::displayed as tone_map;
-pub use visibility::Visibility;
+pub use visibility::{Recent, Visibility};

@@ -4,10 +4,11 @@
 //! pass counts the pixels of each patch. The union over all viewpoints is the
 //! potentially visible set. What is too small to meet a pixel's centre in every
 //! picture is met sooner or later, since each picture's pixels lie elsewhere, and
-//! the atlas keeps a patch for a while after it was last in the set
-//! ([`KEEP_UNSEEN`](crate::atlas::KEEP_UNSEEN)).
+//! from then on it is in the set for a few updates, whatever they find ([`Recent`]).
 //!
 //! Source: SAS 2018, section 3.1 and figure 5.
+
+mod recent;
 
 use std::time::Duration;
 
@@ -21,6 +22,8 @@ use crate::{
     patches::{DrawRange, PatchedScene},
     prediction::Viewpoint,
 };
+
+pub use recent::Recent;
 
 /// Most pictures of a frame: two of each of eight heads.
 const MOST_PICTURES: usize = 2 * 8;

@@ -68,6 +68,7 @@ fn kernels_validate() {
         ("measure", tss::MEASURE_SOURCE),
         ("ids", visibility::IDS_SOURCE),
         ("mark", visibility::MARK_SOURCE),
+        ("recall", visibility::RECALL_SOURCE),
     ] {
         module(name, source);
     }

@@ -1,8 +1,13 @@
-//! A server whose light is even (see `even.wgsl`): for measuring the atlas by itself.
+//! A server whose light is even (see `even.wgsl`): for measuring the atlas by itself, and
+//! beside it what light would cost there.
 
-use std::time::Duration;
+use std::{
+    cell::RefCell,
+    time::{Duration, Instant},
+};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
+use cpu_time::ProcessTime;
 use glam::vec3;
 use shadecast_protocol::{
     ClientTime, EyeView, Fov, FrameId, Method, Pose, UpdateTiming, ViewReport, ViewSeq,
@@ -13,9 +18,10 @@ use shadecast_server::{
     encode::Planes,
     patches::{self, PatchLimits, PatchedScene},
     scene::Scene,
+    still::DEFAULT_BOUNCES,
 };
 
-use super::{LastPlanes, NoVideo, SUPERBLOCKS_A_SIDE, last_planes, view::AtlasView, wall_clock};
+use super::{LastPlanes, NoVideo, SUPERBLOCKS_A_SIDE, last_planes, view::AtlasView};
 use crate::report::{Spent, timed};
 
 pub(crate) use super::view::Look;
@@ -40,36 +46,67 @@ const HALF_BASE: f32 = 0.032;
 
 /// A server that is asked for frames one by one, and looks at its atlas.
 pub(crate) struct Even {
+    /// Of a frame.
+    paths: u32,
     pipeline: Pipeline,
     view: AtlasView,
     planes: LastPlanes,
     texels: u64,
 }
 
-/// A frame and what it took.
+/// A frame, and what it and some of its stages took.
 pub(crate) struct Made {
     pub(crate) frame: Frame,
     pub(crate) spent: Spent,
+    pub(crate) packing: Spent,
+    pub(crate) light: Spent,
 }
 
 impl Even {
     /// Of `scene`, with an atlas of `size` texels.
     pub(crate) fn new(scene: &Scene, method: Method, size: [u16; 2]) -> Result<Self> {
-        let gpu = Gpu::open()?;
-        let superblock = size[0].min(size[1]) / SUPERBLOCKS_A_SIDE;
-        let limits = PatchLimits::for_atlas(superblock, PIXELS_PER_RADIAN);
-        let patched = patches::cut_for(method, scene.clone(), limits);
         let integrator = Integrator {
             smoothing: false,
             ..Integrator::with_bounces(0)
         };
+        let mut even = Self::build(scene, method, size, integrator)?;
+        even.pipeline.light_evenly();
+        Ok(even)
+    }
+
+    /// The same whose light is no longer even, but traced as the server does.
+    pub(crate) fn traced(scene: &Scene, method: Method, size: [u16; 2]) -> Result<Self> {
+        Self::build(
+            scene,
+            method,
+            size,
+            Integrator::with_bounces(DEFAULT_BOUNCES),
+        )
+    }
+
+    /// Frames have about so many paths from now on; at first they have none.
+    pub(crate) fn set_paths(&mut self, paths: u32) {
+        self.paths = paths;
+    }
+
+    fn build(
+        scene: &Scene,
+        method: Method,
+        size: [u16; 2],
+        integrator: Integrator,
+    ) -> Result<Self> {
+        let gpu = Gpu::open()?;
+        let superblock = size[0].min(size[1]) / SUPERBLOCKS_A_SIDE;
+        let limits = PatchLimits::for_atlas(superblock, PIXELS_PER_RADIAN);
+        let patched = patches::cut_for(method, scene.clone(), limits);
         let gpu_scene = GpuScene::new(&gpu, &patched.scene, integrator, &mut |_| ())?;
         let planes = LastPlanes::default();
         let video = Box::new(NoVideo(std::sync::Arc::clone(&planes)));
         let mut pipeline = Pipeline::new(gpu, gpu_scene, patched, size, superblock, video, 1.0)
             .context("cannot make frames of the scene")?;
-        pipeline.light_evenly();
+        pipeline.time_packing_apart();
         Ok(Self {
+            paths: 0,
             view: AtlasView::new(&pipeline, size[0])?,
             pipeline,
             planes,
@@ -111,14 +148,39 @@ impl Even {
             prediction: Prediction::linear(&report, HORIZON, HEADS),
             scene_time: time_of(frame),
             objects_lead: Duration::ZERO,
-            paths: 0,
+            paths: self.paths,
             reset: frame == 0,
             new_client: frame == 0,
             timing: UpdateTiming::default(),
         };
-        let (frame, spent) = timed(|| Ok(self.pipeline.frame(&order, &wall_clock())?))?;
+        let (began, began_cpu) = (Instant::now(), ProcessTime::now());
+        let laps = RefCell::new(Vec::new());
+        let clock = || {
+            let spent = Spent {
+                wall: began.elapsed(),
+                cpu: began_cpu.elapsed(),
+            };
+            laps.borrow_mut().push(spent);
+            spent.wall
+        };
+        let (frame, spent) = timed(|| Ok(self.pipeline.frame(&order, &clock)?))?;
         self.view.update(&self.pipeline, &frame.update);
-        Ok(Made { frame, spent })
+        // In the order of `Stages`.
+        let laps = laps.into_inner();
+        let stage = |at: usize, wall: Duration| match laps[at..] {
+            [begin, end, ..] if end.wall - begin.wall == wall => Ok(Spent {
+                wall,
+                cpu: end.cpu.saturating_sub(begin.cpu),
+            }),
+            _ => bail!("the stages of a frame are not timed as they were"),
+        };
+        let stages = frame.stats.stages;
+        Ok(Made {
+            packing: stage(1, stages.packing)?,
+            light: stage(3, stages.light)?,
+            frame,
+            spent,
+        })
     }
 
     /// What a client sees with objects as at `time`, four numbers a pixel.

@@ -24,7 +24,7 @@ use shadecast_server::{
     still::Still,
 };
 
-use super::{culling::Objects, trace};
+use super::{culling::Objects, stage, trace};
 use crate::{
     flip,
     ours::even::{self, Even, Look, Made, PIXELS_PER_RADIAN, time_of},
@@ -82,7 +82,9 @@ pub(super) struct Row {
     pub(super) placed_anew: u32,
     pub(super) reset: bool,
     pub(super) out_of_memory: bool,
-    pub(super) visibility_and_packing_ms: f64,
+    pub(super) visibility_ms: f64,
+    pub(super) packing_ms: f64,
+    pub(super) packing_cpu_ms: f64,
     pub(super) news_ms: f64,
     pub(super) shading_ms: f64,
     pub(super) picture_ms: f64,
@@ -103,6 +105,7 @@ pub(super) struct Row {
 /// What was found of a scene.
 pub(super) struct Compared {
     pub(super) rows: Vec<Row>,
+    pub(super) stages: Vec<stage::Row>,
     /// Pixels by log2 of their texels, in steps of a quarter, by packer and atlas.
     pub(super) densities: BTreeMap<(&'static str, u64), Vec<u32>>,
     /// The truth and each packer's window at the last compared frame, and below it how
@@ -135,6 +138,7 @@ pub(super) fn measure(
     };
     let mut found = Compared {
         rows: Vec::new(),
+        stages: Vec::new(),
         densities: BTreeMap::new(),
         strip: Vec::new(),
         adapter: String::new(),
@@ -170,6 +174,15 @@ pub(super) fn measure(
                     found.rows.push(row.clone());
                 }
             }
+            drop(walk);
+            // The light's time grows with texels and a packer's with patches: its share is
+            // largest in the smallest atlas.
+            if at > 0 {
+                continue;
+            }
+            let texels = found.rows.last().map_or(0, |row| row.placed_texels);
+            let row = stage::measure(name, scene, method, *size, texels, quick)?;
+            found.stages.push(row);
         }
     }
     Ok(found)
@@ -267,7 +280,9 @@ impl<'a> Walk<'a> {
             placed_anew: anew,
             reset,
             out_of_memory: stats.unplaced > 0,
-            visibility_and_packing_ms: ms(stats.stages.visibility),
+            visibility_ms: ms(stats.stages.visibility),
+            packing_ms: ms(made.packing.wall),
+            packing_cpu_ms: ms(made.packing.cpu),
             news_ms: ms(stats.stages.atlas),
             shading_ms: ms(stats.stages.light),
             picture_ms: ms(stats.stages.picture),

@@ -12,6 +12,7 @@ mod culling;
 mod page;
 mod quadtree;
 mod speed;
+mod stage;
 mod strategies;
 mod strategy;
 #[cfg(test)]
@@ -111,11 +112,16 @@ pub fn run(options: &Options) -> Result<String> {
         Folder::new(&options.out, header)
     };
     let of_packers = page::write(&folder("packing")?, &compared)?;
+    let stages: Vec<stage::Row> = (compared.iter())
+        .flat_map(|found| found.stages.iter().cloned())
+        .collect();
+    folder("packing-stage")?.csv(&stages)?;
     folder("packing-speed")?.csv(&speeds)?;
     folder("packing-kernels")?.csv(&kernels)?;
     folder("packing-strategies")?.csv(&strategies)?;
     let body = format!(
-        "{of_packers}\n{}\n{}\n{}",
+        "{of_packers}\n{}\n{}\n{}\n{}",
+        stage::table_of(&stages),
         speed::table_of(&speeds),
         speed::table_of_kernels(&kernels),
         strategy::table_of(&strategies),

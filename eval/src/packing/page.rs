@@ -170,7 +170,9 @@ fn room(found: &Compared) -> String {
                     "{:.1}",
                     mean(later().map(|row| row.video_bytes as f64 / 1e3))
                 ),
-                milliseconds(|row| row.visibility_and_packing_ms),
+                milliseconds(|row| row.visibility_ms),
+                milliseconds(|row| row.packing_ms),
+                milliseconds(|row| row.packing_cpu_ms),
                 milliseconds(|row| row.shading_ms),
                 milliseconds(|row| row.frame_cpu_ms),
             ]);
@@ -193,7 +195,9 @@ fn room(found: &Compared) -> String {
         "resets",
         "frames out of memory",
         "video, kB a frame",
-        "visibility and packing, ms",
+        "visibility, ms",
+        "packing, ms",
+        "packing, CPU ms",
         "shading, ms",
         "frame, CPU ms",
     ];

@@ -55,6 +55,7 @@ fn halves(_: Effort) -> Result<Vec<Property>> {
         picture::SOURCE,
         visibility::IDS_SOURCE,
         visibility::MARK_SOURCE,
+        visibility::RECALL_SOURCE,
     ];
     let with_halves = sources
         .iter()

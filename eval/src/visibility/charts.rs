@@ -3,7 +3,7 @@
 use super::{
     client, coverage,
     page::near,
-    policy::{CHOICES, PREDICTORS, SERVED},
+    policy::{CHOICES, PREDICTORS, SERVED, WITHOUT_RECALL},
     predict,
     trace::{GAITS, WALK},
 };
@@ -103,11 +103,15 @@ pub(super) fn prediction_charts(rows: &[predict::Row]) -> Vec<Chart> {
 
 /// Missing pixels by latency, by how long patches are kept, and by the speed of the head.
 pub(super) fn missing_charts(rows: &[client::Row]) -> Vec<Chart> {
-    let predictors: Vec<&str> = PREDICTORS.iter().chain([&SERVED]).map(|p| p.name).collect();
+    let predictors: Vec<&str> = PREDICTORS
+        .iter()
+        .chain([&SERVED, &WITHOUT_RECALL])
+        .map(|p| p.name)
+        .collect();
     let walk = || rows.iter().filter(|row| row.gait == WALK.name);
     let of_scene = |row: &client::Row| format!("{}: {}", row.scene, row.policy);
     let compared = walk().filter(|row| predictors.contains(&row.policy));
-    let served = || walk().filter(|row| row.policy == SERVED.name);
+    let forgetful = walk().filter(|row| row.policy == WITHOUT_RECALL.name);
     let kept = |row: &client::Row| {
         let points = [
             (1.0, row.missing_kept_0),
@@ -137,10 +141,10 @@ pub(super) fn missing_charts(rows: &[client::Row]) -> Vec<Chart> {
             level: Some(("0.1 %".to_owned(), 1e-3)),
         },
         Chart {
-            title: "walk, as served: missing, were patches kept".to_owned(),
+            title: "walk, nothing recalled: missing, were patches kept".to_owned(),
             x: Scale::Logarithmic("updates in which a patch may have been seen last"),
             y: Scale::Logarithmic("share of the picture"),
-            lines: served().map(kept).collect(),
+            lines: forgetful.map(kept).collect(),
             level: None,
         },
         Chart {
@@ -158,7 +162,11 @@ pub(super) fn missing_charts(rows: &[client::Row]) -> Vec<Chart> {
 /// Error against run time of the ways to choose viewpoints.
 pub(super) fn cost_charts(rows: &[client::Row]) -> Vec<Chart> {
     let first = rows.first().map(|row| &row.scene);
-    let choices: Vec<&str> = CHOICES.iter().chain([&SERVED]).map(|p| p.name).collect();
+    let choices: Vec<&str> = CHOICES
+        .iter()
+        .chain([&SERVED, &WITHOUT_RECALL])
+        .map(|p| p.name)
+        .collect();
     let chart = |gait: &str, latency: f64| Chart {
         title: format!("{gait}, {latency:.0} ms: missing pixels against time"),
         x: Scale::Linear("CPU ms an update: id pictures and placement"),

@@ -5,7 +5,7 @@
 //! the head's true poses. A pixel is missing where the patch that it should show is in
 //! no block of the atlas: the very passes of the server find and place the visible set,
 //! so what memory takes away is missing too. Beside it stands what would be missing
-//! were patches kept for some updates after they were last seen, and no more.
+//! were patches kept for some updates after they were last in that set, and no more.
 
 use std::time::Duration;
 
@@ -14,6 +14,7 @@ use glam::Vec3;
 use serde::Serialize;
 use shadecast_protocol::{PatchId, Pose};
 use shadecast_server::{
+    Recent,
     atlas::{Atlas, AtlasShape, Footprints},
     prediction::Horizon,
 };
@@ -30,7 +31,7 @@ use crate::report::{Spent, timed};
 const TICKS: u32 = 3;
 /// Side of the atlas, texels.
 const ATLAS: u16 = 1024;
-/// Updates for which patches may be kept after they were last seen.
+/// Updates for which patches may be kept after they were last in the visible set.
 const LIFETIMES: [u32; 5] = [0, 1, 3, 9, 30];
 /// The first updates fill the atlas and are not counted.
 const WARM_UP: u32 = 6;
@@ -60,7 +61,7 @@ pub(super) struct Row {
     pub(super) missing: f64,
     /// In the worst picture.
     pub(super) most_missing: f64,
-    /// Were patches kept for so many updates.
+    /// Were patches kept for so many updates after they were last in the visible set.
     pub(super) missing_kept_0: f64,
     pub(super) missing_kept_1: f64,
     pub(super) missing_kept_3: f64,
@@ -209,6 +210,7 @@ pub(super) fn measure(
 
 /// The first half of the server's frame, and what the client knows of it.
 struct Server {
+    recent: Recent,
     atlas: Atlas,
     footprints: Footprints,
     /// By patch.
@@ -238,6 +240,7 @@ impl Server {
             atlas.wishes(),
         )?;
         Ok(Self {
+            recent: Recent::new(&seer.gpu, patches as u32, pixels)?,
             atlas,
             footprints,
             placed: vec![false; patches],
@@ -265,6 +268,9 @@ impl Server {
                 .device
                 .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
             seer.record(&mut encoder, &prepared.viewpoints, time);
+            if prepared.recalls {
+                self.recent.recall(&mut encoder);
+            }
             let (gpu, gpu_scene) = (&seer.gpu, &seer.gpu_scene);
             let density = prepared.pixels_per_radian;
             self.footprints

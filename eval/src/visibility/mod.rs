@@ -22,7 +22,7 @@ use shadecast_server::scene::{self, Scene};
 
 use self::{
     client::Truth,
-    policy::{CHOICES, PREDICTORS, Policy, SERVED},
+    policy::{CHOICES, PREDICTORS, Policy, SERVED, WITHOUT_RECALL},
     seer::Seer,
     trace::{GAITS, Gait, Head, RATE, WALK},
 };
@@ -186,7 +186,10 @@ fn measure(
     // most is asked of them.
     let last = GAITS[GAITS.len() - 1].name;
     let choices = is_first && [WALK.name, last].contains(&gait.name);
-    let predictors = PREDICTORS.iter().filter(|_| is_first).chain([&SERVED]);
+    let predictors = PREDICTORS
+        .iter()
+        .filter(|_| is_first)
+        .chain([&SERVED, &WITHOUT_RECALL]);
     let latencies = if gait.name == WALK.name {
         extent.latencies
     } else {

@@ -19,6 +19,8 @@ pub(super) struct Policy {
     heads: Heads,
     margin: Margin,
     corners: Corners,
+    /// Whether what had few pixels in the last updates counts as visible.
+    pub(super) recalls: bool,
 }
 
 /// When heads are sampled.
@@ -66,6 +68,7 @@ const fn policy(
         heads,
         margin,
         corners,
+        recalls: true,
     }
 }
 
@@ -77,6 +80,13 @@ pub(super) const SERVED: Policy = policy(
     Margin::Doubt(1.0),
     Corners::Shared(1.0),
 );
+
+/// The same, by what is found in the update itself.
+pub(super) const WITHOUT_RECALL: Policy = Policy {
+    name: "nothing recalled",
+    recalls: false,
+    ..SERVED
+};
 
 /// What is compared at every gait: the same with other predictors.
 pub(super) const PREDICTORS: [Policy; 4] = [
@@ -231,6 +241,7 @@ impl Policy {
             eye: prediction.eye(),
             pixels_per_radian: prediction.pixels_per_radian(),
             viewpoints,
+            recalls: self.recalls,
         }
     }
 }
@@ -240,6 +251,7 @@ pub(super) struct Prepared {
     pub(super) eye: Vec3,
     pub(super) pixels_per_radian: f32,
     pub(super) viewpoints: Vec<Viewpoint>,
+    pub(super) recalls: bool,
 }
 
 #[cfg(test)]

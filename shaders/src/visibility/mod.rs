@@ -1,5 +1,9 @@
 //! Which patches can be seen.
 
+mod recall;
+
+pub use recall::{FEW, LIFETIME, Recall};
+
 /// Entries `id_vertex`, `id_fragment` and `id_fragment_masked`.
 pub const IDS_SOURCE: &str = concat!(
     include_str!("../light/scene.wgsl"),
@@ -9,6 +13,9 @@ pub const IDS_SOURCE: &str = concat!(
 
 /// Kernel `mark`.
 pub const MARK_SOURCE: &str = include_str!("mark.wgsl");
+
+/// Kernel `recall`.
+pub const RECALL_SOURCE: &str = include_str!("recall.wgsl");
 
 /// Words that `mark` fills: the pixels of each patch, then a bit for each with any.
 #[must_use]
