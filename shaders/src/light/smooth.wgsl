@@ -18,8 +18,9 @@ const RADIUS: i32 = 3;
 // Relative error that smoothing is believed to make: a texel whose own is far
 // below it stands for itself.
 const SMOOTHING_ERROR: f32 = 0.08;
-// Standard deviations of difference that still count as noise.
-const TOLERANCE: f32 = 3.0;
+// Standard deviations of difference that still count as noise. Three of them took
+// corners and what lies hidden behind a step for noise, and darkened the steps.
+const TOLERANCE: f32 = 1.0;
 // Relative standard deviation that a sample has at least. Reflections of wide lamps
 // have hardly any, and shapes that smoothing would take from them.
 const LEAST_NOISE: f32 = 0.8;
