@@ -1,11 +1,11 @@
 //! The twin of all kernels of the snake: one call a frame.
 
 use super::{
-    ActiveTriangle, BIN, BINS, COLLAPSE_SHARE, DEAD_BAND, FORM, FREEZE_FRAMES, MOST_BIAS,
-    MOST_LARGE, NONE, ODD, Place, RAISES, SMALL_CHANGE, SnakeParameters, Superblock, Superblocks,
+    ActiveTriangle, BIN, BINS, COLLAPSE_SHARE, DEAD_BAND, Extent, FORM, FREEZE_FRAMES, MOST_BIAS,
+    MOST_LARGE, NONE, ODD, RAISES, SMALL_CHANGE, SnakeParameters, Superblock, Superblocks,
     Template, Wish, bin_of,
     bins::{TURN, is_foreshortened_alike},
-    bits, is_near, least_bias, map_bin,
+    bits, capacity_of, is_near, least_bias, map_bin,
     scale::{CELLS, cell},
     status, templates, with_spare,
 };
@@ -46,7 +46,7 @@ pub struct Outcome {
 pub struct Packer {
     templates: Vec<Template>,
     superblocks: Superblocks,
-    places: Vec<Option<Place>>,
+    places: Vec<Vec<Extent>>,
     /// Triangles that have a slot, ascending.
     residents: Vec<ActiveTriangle>,
     frozen_for: u32,
@@ -78,6 +78,13 @@ struct Count {
     end: u32,
 }
 
+impl Count {
+    /// Visible triangles.
+    fn need(self) -> u32 {
+        self.stays + self.wants
+    }
+}
+
 /// What becomes of a bin.
 #[derive(Clone, Copy, Default)]
 struct Plan {
@@ -94,7 +101,7 @@ impl Packer {
         Self {
             templates: templates(),
             superblocks: Superblocks::new(parameters.sheet()),
-            places: vec![None; BINS],
+            places: vec![Vec::new(); BINS],
             residents: Vec::new(),
             frozen_for: 0,
         }
@@ -135,11 +142,13 @@ impl Packer {
         self.residents = active.iter().map(|active| active.record).collect();
         self.residents.retain(|record| record.shape != NONE);
         outcome.active = active.into_iter().map(|active| active.record).collect();
-        for place in self.places.iter().flatten() {
-            let width = self.superblocks.blocks()[place.superblock as usize].width;
-            outcome.reserved[0] += 1;
-            outcome.reserved[1] += place.units * parameters.unit * width;
-            outcome.reserved[2] += place.capacity;
+        for extents in &self.places {
+            outcome.reserved[0] += u32::from(!extents.is_empty());
+            for extent in extents {
+                let width = self.superblocks.blocks()[extent.superblock as usize].width;
+                outcome.reserved[1] += extent.units * parameters.unit * width;
+                outcome.reserved[2] += extent.capacity;
+            }
         }
         outcome.superblocks = self.superblocks.blocks().to_vec();
         outcome
@@ -147,8 +156,8 @@ impl Packer {
 
     /// Where a bin lies.
     #[must_use]
-    pub fn bin_place(&self, bin: u32) -> Option<Place> {
-        self.places[bin as usize]
+    pub fn extents(&self, bin: u32) -> &[Extent] {
+        &self.places[bin as usize]
     }
 
     /// The visible triangles and those that have a slot, by ascending patch.
@@ -210,7 +219,7 @@ impl Packer {
         parameters: &SnakeParameters,
         outcome: &mut Outcome,
     ) -> Vec<Plan> {
-        self.superblocks.begin();
+        self.superblocks.columns.begin();
         if parameters.reset == 0 {
             let counts = self.request(active, parameters, outcome, false);
             if let Ok(plans) = self.lay_bins(&counts, outcome.status & status::FROZEN != 0) {
@@ -222,8 +231,8 @@ impl Packer {
         self.frozen_for = 0;
         let mut raises = RAISES.iter();
         loop {
-            self.superblocks.clear();
-            self.places.fill(None);
+            self.superblocks.columns.clear();
+            self.places.fill(Vec::new());
             let counts = self.request(active, parameters, outcome, true);
             let raise = match (self.lay_bins(&counts, false), raises.next()) {
                 (Ok(plans), _) | (Err(plans), None) => return plans,
@@ -268,7 +277,7 @@ impl Packer {
         }
         let is_sink = |bin: u32| {
             let row = self.templates[bin as usize].in_row(parameters.least_width);
-            self.places[bin as usize].is_some() || demand[bin as usize] > row
+            !self.places[bin as usize].is_empty() || demand[bin as usize] > row
         };
         let mapping: Vec<u32> = (0..BINS as u32)
             .map(|bin| match demand[bin as usize] {
@@ -287,86 +296,90 @@ impl Packer {
     fn lay_bins(&mut self, counts: &[Count], frozen: bool) -> Result<Vec<Plan>, Vec<Plan>> {
         let mut plans = vec![Plan::default(); BINS];
         for bin in (0..BINS).rev() {
-            let (template, count) = (&self.templates[bin], counts[bin]);
-            let Some(place) = &mut self.places[bin] else {
+            let (template, count, extents) =
+                (&self.templates[bin], counts[bin], &mut self.places[bin]);
+            let capacity = capacity_of(extents);
+            if capacity == 0 {
                 continue;
-            };
-            let need = count.stays + count.wants;
-            plans[bin].evicts = need + count.idles > place.capacity;
-            let live = if plans[bin].evicts {
-                need
-            } else {
-                need + count.idles
-            };
-            let mut gone = live == 0
-                || need > place.capacity
-                    && !self.superblocks.grow(template, place, with_spare(need));
-            if !gone && !frozen && live * 2 < place.capacity {
-                let least = with_spare(live);
-                if count.end <= least {
-                    self.superblocks.shrink(template, place, least);
-                } else {
-                    gone = self.superblocks.is_sparse(template, place, least);
-                }
             }
-            if gone {
-                self.superblocks.release(*place);
-                self.places[bin] = None;
+            let need = count.stays + count.wants;
+            plans[bin].evicts = need + count.idles > capacity;
+            let live = need + if plans[bin].evicts { 0 } else { count.idles };
+            let least = with_spare(live);
+            let is_sparse =
+                || count.end > 2 * least && self.superblocks.is_sparse(template, extents, least);
+            if live == 0 || !frozen && is_sparse() {
+                self.superblocks.release(extents);
                 plans[bin].moved = true;
+            } else if !frozen {
+                self.superblocks
+                    .shrink(template, extents, least.max(count.end));
             }
         }
         if !frozen {
             self.collapse(&mut plans);
         }
-        self.superblocks.drop_last();
+        self.superblocks.columns.drop_last();
         let mut is_full = false;
-        for (bin, triangles) in self.homeless(counts) {
-            self.places[bin] = self.superblocks.place(&self.templates[bin], triangles);
-            plans[bin].moved = true;
-            is_full |= self.places[bin].is_none();
+        for bin in self.short_of_room(counts) {
+            let (template, extents) = (&self.templates[bin], &mut self.places[bin]);
+            let asks = with_spare(counts[bin].need());
+            plans[bin].moved |= extents.is_empty();
+            let more = asks - capacity_of(extents);
+            if !self.superblocks.extend(template, extents, more) {
+                self.superblocks.release(extents);
+                plans[bin].moved = true;
+                if !self.superblocks.extend(template, extents, asks) {
+                    self.superblocks.release(extents);
+                    is_full = true;
+                }
+            }
         }
         if is_full { Err(plans) } else { Ok(plans) }
     }
 
-    /// Bins that ask for rows, and for how many triangles, in their order.
-    fn homeless(&self, counts: &[Count]) -> Vec<(usize, u32)> {
-        let need = |bin: usize| with_spare(counts[bin].stays + counts[bin].wants);
-        let asks = |bin: &usize| self.places[*bin].is_none() && need(*bin) > 0;
-        let area = |bin: usize| self.superblocks.area(&self.templates[bin], need(bin));
+    /// Bins that have too few slots, in the order in which they get more.
+    fn short_of_room(&self, counts: &[Count]) -> Vec<usize> {
+        let sheet = self.superblocks.sheet();
+        let capacity = |bin: usize| capacity_of(&self.places[bin]);
+        let asks = |bin: &usize| counts[*bin].need() > capacity(*bin);
+        let area = |bin: usize| {
+            let more = with_spare(counts[bin].need()) - capacity(bin);
+            sheet.area(&self.templates[bin], more)
+        };
         let (mut large, small): (Vec<usize>, Vec<usize>) =
-            ((0..BINS).rev().filter(asks)).partition(|&bin| self.superblocks.is_large(area(bin)));
+            ((0..BINS).rev().filter(asks)).partition(|&bin| sheet.is_large(area(bin)));
         if large.len() <= MOST_LARGE {
             large.sort_by_key(|&bin| std::cmp::Reverse(area(bin)));
         }
-        let all = large.into_iter().chain(small);
-        all.map(|bin| (bin, need(bin))).collect()
+        large.into_iter().chain(small).collect()
     }
 
     /// Empties superblocks that have become nearly empty.
     fn collapse(&mut self, plans: &mut [Plan]) {
         let units = self.superblocks.sheet().units;
-        let mut collapses = Vec::new();
-        for block in self.superblocks.blocks_mut() {
-            let falls =
-                block.used * COLLAPSE_SHARE < units && block.peak * COLLAPSE_SHARE >= 2 * units;
-            collapses.push(falls);
-        }
-        for (place, plan) in self.places.iter_mut().zip(plans) {
-            if let Some(gone) = place.take_if(|place| collapses[place.superblock as usize]) {
-                self.superblocks.release(gone);
+        let falls: Vec<bool> = (self.superblocks.blocks().iter())
+            .map(|block| {
+                block.used * COLLAPSE_SHARE < units && block.peak * COLLAPSE_SHARE >= 2 * units
+            })
+            .collect();
+        for (extents, plan) in self.places.iter_mut().zip(plans) {
+            if extents
+                .iter()
+                .any(|extent| falls[extent.superblock as usize])
+            {
+                self.superblocks.release(extents);
                 plan.moved = true;
             }
         }
-        for (block, falls) in self.superblocks.blocks_mut().iter_mut().zip(collapses) {
-            if falls {
-                block.peak = 0;
-            }
+        for superblock in (0..falls.len()).filter(|&superblock| falls[superblock]) {
+            self.superblocks.columns.forget_peak(superblock);
         }
     }
 
     /// Each triangle that wants a slot gets the next free one of its bin.
     fn assign(&mut self, active: &mut [Active], plans: &[Plan], parameters: &SnakeParameters) {
-        let slots = |bin: usize| self.places[bin].map_or(0, |place| place.capacity as usize);
+        let slots = |bin: usize| capacity_of(&self.places[bin]) as usize;
         let mut taken: Vec<Vec<bool>> = (0..BINS).map(|bin| vec![false; slots(bin)]).collect();
         for active in active.iter_mut() {
             let plan = plans[active.bin as usize];
@@ -398,17 +411,21 @@ impl Packer {
 
     /// Tells where a slot lies.
     fn set_slot(&self, record: &mut ActiveTriangle, bin: u32, parameters: &SnakeParameters) {
-        let Some(place) = self.places[bin as usize] else {
+        let (template, mut index) = (&self.templates[bin as usize], record.index);
+        let Some(extent) = self.places[bin as usize].iter().find(|extent| {
+            let is_here = index < extent.capacity;
+            index -= if is_here { 0 } else { extent.capacity };
+            is_here
+        }) else {
             return;
         };
-        let template = &self.templates[bin as usize];
-        let block = self.superblocks.blocks()[place.superblock as usize];
+        let block = self.superblocks.blocks()[extent.superblock as usize];
         let per = template.in_row(block.width);
-        let (row, column) = (record.index / per, record.index % per);
+        let (row, column) = (index / per, index % per);
         let is_odd = column % 2 == 1;
         let pair = template.to_odd + template.to_even;
         let x = block.x + column / 2 * pair + if is_odd { template.to_odd } else { 0 };
-        let y = place.first * parameters.unit + row * (template.height + 1);
+        let y = extent.first * parameters.unit + row * (template.height + 1);
         record.at = x | y << 16;
         record.shape = record.shape & !ODD | if is_odd { ODD } else { 0 };
     }
