@@ -14,7 +14,10 @@
 //! filling holes, in passing over superblocks of which a bin's rows would leave more
 //! than a quarter empty, and in placing large bins first, the largest first of all.
 
-use super::{bins::Template, columns::Columns, columns::MOST_SUPERBLOCKS, columns::Superblock};
+use super::{
+    bins::Template,
+    columns::{Columns, MOST_SUPERBLOCKS, Superblock},
+};
 
 /// Pieces of a bin at most.
 pub const MOST_EXTENTS: usize = 8;
@@ -333,3 +336,6 @@ fn square_root(area: u32) -> u32 {
     }
     root + u32::from(root * root < area)
 }
+
+#[cfg(test)]
+mod tests;
