@@ -1,6 +1,6 @@
 // The slots of all bins, a bit each: triangles that keep theirs mark them, and the
 // nth triangle that asks for one of a bin gets the nth that is free.
-// Twin: `Packer::assign` in place.rs. Source: SnakeBinning 2021, sections 3.3 and 3.6.
+// Twin: assign.rs. Source: SnakeBinning 2021, sections 3.3 and 3.6.
 
 fn requests_of(bin: u32) -> u32 {
     let moved = (plans[bin].flags & MOVED) != 0u;

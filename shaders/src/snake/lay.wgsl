@@ -2,7 +2,7 @@
 // are nearly empty collapse, and then bins that have too few look for room. Or says
 // what must be done first. One group; its first thread decides, bin by bin from the
 // largest down, and the others list the bins that it has to look at.
-// Twin: `Packer::lay_bins` in place.rs. Source: SnakeBinning 2021, section 3.5,
+// Twin: lay.rs. Source: SnakeBinning 2021, section 3.5,
 // algorithm 2.
 
 const COLLAPSE_SHARE: u32 = 8u;

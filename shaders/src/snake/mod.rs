@@ -27,12 +27,15 @@
 //! not their rows, for a few frames. Bins may lie in several pieces, and so a 16th of
 //! spare slots does where the original needs 30 %.
 
+mod assign;
 mod bins;
 mod columns;
 mod footprint;
+mod lay;
 mod mapping;
 mod place;
 mod scale;
+mod sheet;
 mod superblocks;
 
 use bytemuck::{Pod, Zeroable};
@@ -46,7 +49,8 @@ pub use footprint::{NO_TURN, SnakeFootprintParameters, snake_footprint};
 pub use mapping::map_bin;
 pub use place::{Outcome, Packer, Seen};
 pub use scale::{BIAS_STEP, CELLS, DEAD_BAND, MOST_BIAS, least_bias};
-pub use superblocks::{Extent, MOST_EXTENTS, MOST_LARGE, Sheet, Superblocks, capacity_of};
+pub use sheet::{MOST_LARGE, Sheet};
+pub use superblocks::{Extent, MOST_EXTENTS, Superblocks, capacity_of};
 
 /// Kernels `count_active`, `scan_active`, `gather`, `leave_out`, `choose_scale`,
 /// `choose_bins`, `map_bins`, `choose_targets`, `superblocks`, `scan_slots`,

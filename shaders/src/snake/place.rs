@@ -1,13 +1,12 @@
 //! The twin of all kernels of the snake: one call a frame.
 
 use super::{
-    ActiveTriangle, BIN, BINS, COLLAPSE_SHARE, DEAD_BAND, Extent, FORM, FREEZE_FRAMES, MOST_BIAS,
-    MOST_LARGE, NONE, ODD, RAISES, SMALL_CHANGE, SnakeParameters, Superblock, Superblocks,
-    Template, Wish, bin_of,
+    ActiveTriangle, BIN, BINS, DEAD_BAND, Extent, FORM, FREEZE_FRAMES, MOST_BIAS, NONE, ODD,
+    RAISES, SMALL_CHANGE, SnakeParameters, Superblock, Superblocks, Template, Wish, bin_of,
     bins::{TURN, is_foreshortened_alike},
-    bits, capacity_of, is_near, least_bias, map_bin,
+    bits, is_near, least_bias, map_bin,
     scale::{CELLS, cell},
-    status, templates, with_spare,
+    status, templates,
 };
 use crate::atlas::importance;
 
@@ -44,54 +43,54 @@ pub struct Outcome {
 /// Who has which slot.
 #[derive(Clone, Debug)]
 pub struct Packer {
-    templates: Vec<Template>,
-    superblocks: Superblocks,
-    places: Vec<Vec<Extent>>,
+    pub(super) templates: Vec<Template>,
+    pub(super) superblocks: Superblocks,
+    pub(super) places: Vec<Vec<Extent>>,
     /// Triangles that have a slot, ascending.
     residents: Vec<ActiveTriangle>,
     frozen_for: u32,
 }
 
 /// A triangle of this frame.
-struct Active {
-    record: ActiveTriangle,
+pub(super) struct Active {
+    pub(super) record: ActiveTriangle,
     wish: Wish,
     /// Shape of the slot that it had.
     old: u32,
     /// The bin that it would choose, or has.
-    bin: u32,
+    pub(super) bin: u32,
 }
 
 impl Active {
-    fn is(&self, bit: u32) -> bool {
+    pub(super) fn is(&self, bit: u32) -> bool {
         self.record.bits & bit != 0
     }
 }
 
 /// What is counted of the triangles of a bin.
 #[derive(Clone, Copy, Default)]
-struct Count {
+pub(super) struct Count {
     wants: u32,
     stays: u32,
-    idles: u32,
+    pub(super) idles: u32,
     /// Behind the last slot that is in use.
-    end: u32,
+    pub(super) end: u32,
 }
 
 impl Count {
     /// Visible triangles.
-    fn need(self) -> u32 {
+    pub(super) fn need(self) -> u32 {
         self.stays + self.wants
     }
 }
 
 /// What becomes of a bin.
 #[derive(Clone, Copy, Default)]
-struct Plan {
+pub(super) struct Plan {
     /// Was given rows in this frame, or has lost them.
-    moved: bool,
+    pub(super) moved: bool,
     /// Triangles out of sight give their slots back.
-    evicts: bool,
+    pub(super) evicts: bool,
 }
 
 impl Packer {
@@ -152,12 +151,6 @@ impl Packer {
         }
         outcome.superblocks = self.superblocks.blocks().to_vec();
         outcome
-    }
-
-    /// Where a bin lies.
-    #[must_use]
-    pub fn extents(&self, bin: u32) -> &[Extent] {
-        &self.places[bin as usize]
     }
 
     /// The visible triangles and those that have a slot, by ascending patch.
@@ -290,144 +283,6 @@ impl Packer {
             choose_target(active, &mapping, &mut counts, parameters, frozen, anew);
         }
         counts
-    }
-
-    /// Algorithm 2. With bins that found no room, the plans are an error.
-    fn lay_bins(&mut self, counts: &[Count], frozen: bool) -> Result<Vec<Plan>, Vec<Plan>> {
-        let mut plans = vec![Plan::default(); BINS];
-        for bin in (0..BINS).rev() {
-            let (template, count, extents) =
-                (&self.templates[bin], counts[bin], &mut self.places[bin]);
-            let capacity = capacity_of(extents);
-            if capacity == 0 {
-                continue;
-            }
-            let need = count.stays + count.wants;
-            plans[bin].evicts = need + count.idles > capacity;
-            let live = need + if plans[bin].evicts { 0 } else { count.idles };
-            let least = with_spare(live);
-            let is_sparse =
-                || count.end > 2 * least && self.superblocks.is_sparse(template, extents, least);
-            if live == 0 || !frozen && is_sparse() {
-                self.superblocks.release(extents);
-                plans[bin].moved = true;
-            } else if !frozen {
-                self.superblocks
-                    .shrink(template, extents, least.max(count.end));
-            }
-        }
-        if !frozen {
-            self.collapse(&mut plans);
-        }
-        self.superblocks.columns.drop_last();
-        let mut is_full = false;
-        for bin in self.short_of_room(counts) {
-            let (template, extents) = (&self.templates[bin], &mut self.places[bin]);
-            let asks = with_spare(counts[bin].need());
-            plans[bin].moved |= extents.is_empty();
-            let more = asks - capacity_of(extents);
-            if !self.superblocks.extend(template, extents, more) {
-                self.superblocks.release(extents);
-                plans[bin].moved = true;
-                if !self.superblocks.extend(template, extents, asks) {
-                    self.superblocks.release(extents);
-                    is_full = true;
-                }
-            }
-        }
-        if is_full { Err(plans) } else { Ok(plans) }
-    }
-
-    /// Bins that have too few slots, in the order in which they get more.
-    fn short_of_room(&self, counts: &[Count]) -> Vec<usize> {
-        let sheet = self.superblocks.sheet();
-        let capacity = |bin: usize| capacity_of(&self.places[bin]);
-        let asks = |bin: &usize| counts[*bin].need() > capacity(*bin);
-        let area = |bin: usize| {
-            let more = with_spare(counts[bin].need()) - capacity(bin);
-            sheet.area(&self.templates[bin], more)
-        };
-        let (mut large, small): (Vec<usize>, Vec<usize>) =
-            ((0..BINS).rev().filter(asks)).partition(|&bin| sheet.is_large(area(bin)));
-        if large.len() <= MOST_LARGE {
-            large.sort_by_key(|&bin| std::cmp::Reverse(area(bin)));
-        }
-        large.into_iter().chain(small).collect()
-    }
-
-    /// Empties superblocks that have become nearly empty.
-    fn collapse(&mut self, plans: &mut [Plan]) {
-        let units = self.superblocks.sheet().units;
-        let falls: Vec<bool> = (self.superblocks.blocks().iter())
-            .map(|block| {
-                block.used * COLLAPSE_SHARE < units && block.peak * COLLAPSE_SHARE >= 2 * units
-            })
-            .collect();
-        for (extents, plan) in self.places.iter_mut().zip(plans) {
-            if extents
-                .iter()
-                .any(|extent| falls[extent.superblock as usize])
-            {
-                self.superblocks.release(extents);
-                plan.moved = true;
-            }
-        }
-        for superblock in (0..falls.len()).filter(|&superblock| falls[superblock]) {
-            self.superblocks.columns.forget_peak(superblock);
-        }
-    }
-
-    /// Each triangle that wants a slot gets the next free one of its bin.
-    fn assign(&mut self, active: &mut [Active], plans: &[Plan], parameters: &SnakeParameters) {
-        let slots = |bin: usize| capacity_of(&self.places[bin]) as usize;
-        let mut taken: Vec<Vec<bool>> = (0..BINS).map(|bin| vec![false; slots(bin)]).collect();
-        for active in active.iter_mut() {
-            let plan = plans[active.bin as usize];
-            let record = &mut active.record;
-            let is_idle = record.bits & bits::IDLE != 0;
-            if record.bits & bits::KEPT != 0 && plan.moved {
-                record.bits = record.bits & !bits::KEPT | bits::WANTED | bits::CHANGED;
-            } else if is_idle && (plan.moved || plan.evicts) {
-                record.shape = NONE;
-            } else if is_idle || record.bits & bits::KEPT != 0 {
-                taken[active.bin as usize][record.index as usize] = true;
-                self.set_slot(record, active.bin, parameters);
-            }
-        }
-        let mut next = vec![0_usize; BINS];
-        for active in active.iter_mut().filter(|active| active.is(bits::WANTED)) {
-            let bin = active.bin as usize;
-            let free = taken[bin].iter().skip(next[bin]).position(|taken| !taken);
-            let Some(free) = free else {
-                active.record.shape = NONE;
-                active.record.bits &= !bits::CHANGED;
-                continue;
-            };
-            active.record.index = (next[bin] + free) as u32;
-            next[bin] += free + 1;
-            self.set_slot(&mut active.record, active.bin, parameters);
-        }
-    }
-
-    /// Tells where a slot lies.
-    fn set_slot(&self, record: &mut ActiveTriangle, bin: u32, parameters: &SnakeParameters) {
-        let (template, mut index) = (&self.templates[bin as usize], record.index);
-        let Some(extent) = self.places[bin as usize].iter().find(|extent| {
-            let is_here = index < extent.capacity;
-            index -= if is_here { 0 } else { extent.capacity };
-            is_here
-        }) else {
-            return;
-        };
-        let block = self.superblocks.blocks()[extent.superblock as usize];
-        let per = template.in_row(block.width);
-        let (row, column) = (index / per, index % per);
-        let is_odd = column % 2 == 1;
-        let pair = template.to_odd + template.to_even;
-        let x = block.x + column / 2 * pair + if is_odd { template.to_odd } else { 0 };
-        let y = extent.first * parameters.unit + row * (template.height + 1);
-        record.at = x | y << 16;
-        record.shape = record.shape & !ODD | if is_odd { ODD } else { 0 };
     }
 }
 
