@@ -153,7 +153,7 @@ impl Pipeline {
         let recent = Recent::new(&gpu, scene.patches.len() as u32, pixels)?;
         let packer = Packer::new(&gpu, &gpu_scene, &scene, size, superblock, pixels)?;
         let light = Light::new(&gpu, &gpu_scene, size, scene.method)?;
-        let picture = PictureConversion::new(&gpu, light.shown(), size)?;
+        let picture = PictureConversion::new(&gpu, light.shown(), size, scene.method)?;
         let lasting = scene
             .patches
             .iter()

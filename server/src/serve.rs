@@ -62,7 +62,7 @@ pub(crate) fn serve(arguments: &ServeArguments) -> anyhow::Result<()> {
     } else {
         PIXELS_PER_RADIAN
     };
-    let mut limits = PatchLimits::for_atlas(superblock, density);
+    let mut limits = PatchLimits::for_method(arguments.method, superblock, density);
     if gpu.is_software {
         // Sharp walls at one's nose are not worth drawing many times the scene.
         limits.most_triangles = FEW_TRIANGLES.max(scene.triangles.len() * 2);

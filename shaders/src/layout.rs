@@ -233,7 +233,7 @@ fn layouts_match() {
     );
     same_layout!(&carry, CarryParameters, move_count, atlas_width, padding);
     let planes = module("picture", crate::picture::SOURCE);
-    same_layout!(&planes, PictureParameters, size, exposure, padding);
+    same_layout!(&planes, PictureParameters, size, exposure, fills);
 }
 
 #[test]

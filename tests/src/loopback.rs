@@ -81,7 +81,7 @@ impl Loopback {
     /// # Errors
     /// As [`new`](Self::new).
     pub fn by(method: Method, scene: Scene, seed: u64) -> anyhow::Result<Self> {
-        let limits = PatchLimits::for_atlas(SUPERBLOCK, 165.0);
+        let limits = PatchLimits::for_method(method, SUPERBLOCK, 165.0);
         let patched = patches::cut_for(method, scene, limits);
         let spawn = patched.scene.spawn.unwrap_or(Pose::IDENTITY);
         let gpu = Gpu::open()?;

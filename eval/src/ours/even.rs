@@ -97,7 +97,7 @@ impl Even {
     ) -> Result<Self> {
         let gpu = Gpu::open()?;
         let superblock = size[0].min(size[1]) / SUPERBLOCKS_A_SIDE;
-        let limits = PatchLimits::for_atlas(superblock, PIXELS_PER_RADIAN);
+        let limits = PatchLimits::for_method(method, superblock, PIXELS_PER_RADIAN);
         let patched = patches::cut_for(method, scene.clone(), limits);
         let gpu_scene = GpuScene::new(&gpu, &patched.scene, integrator, &mut |_| ())?;
         let planes = LastPlanes::default();

@@ -23,6 +23,7 @@ mod tests;
 use std::fmt;
 
 use shadecast_protocol::{Method, ObjectId, PatchShape};
+use shadecast_shaders::snake::SIZES;
 
 use crate::scene::{Alpha, Scene, Triangle};
 
@@ -95,6 +96,9 @@ pub struct DrawRange {
     pub triangle_count: u32,
 }
 
+/// Texels between the ends of the snake's longest footprint.
+const LARGEST_FOOTPRINT: u16 = SIZES[SIZES.len() - 1];
+
 /// Bounds on what is split at load.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatchLimits {
@@ -113,6 +117,9 @@ impl PatchLimits {
     /// the million triangles that the server is made for.
     const MOST_TRIANGLES: usize = 2_000_000;
 
+    /// Of a triangle that is placed by itself, metres.
+    const LONGEST_TRIANGLE: f32 = 1.2;
+
     /// The longest edge that, square to the view and two metres away, covers
     /// no more pixels than a superblock has texels (SAS 2018, section 6.4).
     #[must_use]
@@ -123,6 +130,23 @@ impl PatchLimits {
         Self {
             longest_edge: 2.0 * Self::DISTANCE * (angle * 0.5).tan(),
             most_triangles: Self::MOST_TRIANGLES,
+        }
+    }
+
+    /// What [`for_atlas`](Self::for_atlas) is for a method. The snake's largest footprint
+    /// does not depend on superblocks, and fewer triangles waste less about their edges;
+    /// but one that reaches about the head is measured from too far away.
+    #[must_use]
+    pub fn for_method(method: Method, superblock_side: u16, pixels_per_radian: f32) -> Self {
+        match method {
+            Method::Sas | Method::Tss => Self::for_atlas(superblock_side, pixels_per_radian),
+            Method::Snake => {
+                let limits = Self::for_atlas(LARGEST_FOOTPRINT, pixels_per_radian);
+                Self {
+                    longest_edge: limits.longest_edge.min(Self::LONGEST_TRIANGLE),
+                    ..limits
+                }
+            }
         }
     }
 }

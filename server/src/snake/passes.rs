@@ -1,8 +1,7 @@
 //! The kernels of the snake, in their order, and the buffers between them.
 
 use shadecast_shaders::snake::{
-    ActiveTriangle, BINS, MOST_SUPERBLOCKS, NONE, RAISES, SOURCE, SnakeParameters, SnakeState,
-    TALLY_WORDS, UNIT_WORDS, templates,
+    ActiveTriangle, BINS, NONE, RAISES, SOURCE, SnakeParameters, SnakeState, TALLY_WORDS, templates,
 };
 use wgpu::ShaderStages;
 
@@ -14,9 +13,6 @@ use crate::{
 
 /// Threads of a group, where a thread has a run of triangles.
 const GROUP: u32 = 64;
-
-/// Bytes of the state that are read back.
-const STATE: u64 = size_of::<SnakeState>() as u64;
 
 /// How many groups a kernel gets.
 #[derive(Clone, Copy, Debug)]
@@ -205,10 +201,7 @@ impl Passes {
         let none = vec![NONE; (self.slots.size() / 4) as usize];
         gpu.queue
             .write_buffer(&self.slots, 0, bytemuck::cast_slice(&none));
-        let mut state = vec![0_u32; (SnakeState::BYTES / 4) as usize];
-        // Bins lie in no superblock.
-        let places = STATE as usize / 4 + MOST_SUPERBLOCKS * UNIT_WORDS;
-        state[places..].fill(NONE);
+        let state = vec![0_u32; (SnakeState::BYTES / 4) as usize];
         gpu.queue
             .write_buffer(&self.state, 0, bytemuck::cast_slice(&state));
     }

@@ -9,9 +9,9 @@ use shadecast_shaders::snake::{
 use super::SnakeError;
 use crate::atlas::{AtlasStats, KEEP_UNSEEN, Placed, VisiblePatch};
 
-/// Share of the texels that the visible set may cost in an empty atlas, spare slots
-/// (30 %) and ends of rows not counted.
-pub const FILL_TARGET: f32 = 0.6;
+/// Share of the texels that the visible set may cost in an empty atlas, spare slots,
+/// slots of what is out of sight and ends of rows not counted.
+pub const FILL_TARGET: f32 = 0.68;
 /// The fill target never falls below this.
 const LEAST_FILL: f32 = 0.1;
 /// Frames between two resets below which the second is too soon: a second at 30

@@ -14,8 +14,8 @@ pub struct PictureParameters {
     pub size: [u32; 2],
     /// Factor before the tone curve.
     pub exposure: f32,
-    /// Zero.
-    pub padding: u32,
+    /// 1 where what was never lit shows the mean of what is lit about it, and not grey.
+    pub fills: u32,
 }
 
 /// Radiance times exposure that is as white as any: infinity would be no number

@@ -1,10 +1,6 @@
 // The slots of all bins, a bit each: triangles that keep theirs mark them, and the
 // nth triangle that asks for one of a bin gets the nth that is free.
-// Twin: `Packer::assign` in place.rs. Source: SnakeBinning 2021, sections 3.3 and 3.6.
-
-fn capacity_now(bin: u32) -> u32 {
-    return select(state.places[bin].capacity, 0u, state.places[bin].superblock == NONE);
-}
+// Twin: assign.rs. Source: SnakeBinning 2021, sections 3.3 and 3.6.
 
 fn requests_of(bin: u32) -> u32 {
     let moved = (plans[bin].flags & MOVED) != 0u;
@@ -19,11 +15,11 @@ fn scan_slots(@builtin(local_invocation_index) lane: u32) {
     let end = min(begin + share, BINS);
     var own = vec4<u32>(0u);
     for (var bin = begin; bin < end; bin++) {
-        own += vec4<u32>((capacity_now(bin) + 31u) / 32u, requests_of(bin), 0u, 0u);
+        own += vec4<u32>((state.rooms[bin].capacity + 31u) / 32u, requests_of(bin), 0u, 0u);
     }
     var before = sum_before(lane, LANES, own);
     for (var bin = begin; bin < end; bin++) {
-        let capacity = capacity_now(bin);
+        let capacity = state.rooms[bin].capacity;
         plans[bin].first_word = before.x;
         plans[bin].first_request = before.y;
         before += vec4<u32>((capacity + 31u) / 32u, requests_of(bin), 0u, 0u);
@@ -31,11 +27,13 @@ fn scan_slots(@builtin(local_invocation_index) lane: u32) {
             // What is behind the last slot is no slot.
             atomicOr(&taken[before.x - 1u], 0xffffffffu << (capacity % 32u));
         }
-        if (state.places[bin].superblock != NONE) {
-            let place = state.places[bin];
-            atomicAdd(&state.reserved, place.units * snake.unit * state.superblocks[place.superblock].width);
+        for (var nth = 0u; nth < state.rooms[bin].extents; nth++) {
+            let extent = state.extents[bin * MOST_EXTENTS + nth];
+            atomicAdd(&state.reserved, extent.units * snake.unit * state.superblocks[extent.superblock].width);
+        }
+        if (capacity != 0u) {
             atomicAdd(&state.bins, 1u);
-            atomicAdd(&state.slots, place.capacity);
+            atomicAdd(&state.slots, capacity);
         }
     }
     if (lane == LANES - 1u) {
@@ -49,13 +47,19 @@ fn set_slot(i: u32, index: u32) {
     let shape = active_triangles[i].shape;
     let bin = shape & BIN;
     let t = templates[bin];
-    let place = state.places[bin];
-    let column = state.superblocks[place.superblock];
+    var at = bin * MOST_EXTENTS;
+    var here = index;
+    for (var nth = 1u; nth < state.rooms[bin].extents && here >= state.extents[at].capacity; nth++) {
+        here -= state.extents[at].capacity;
+        at += 1u;
+    }
+    let extent = state.extents[at];
+    let column = state.superblocks[extent.superblock];
     let per = max(in_row(bin, column.width), 1u);
-    let in_strip = index % per;
+    let in_strip = here % per;
     let is_odd = (in_strip & 1u) == 1u;
     let x = column.x + in_strip / 2u * (t.to_odd + t.to_even) + select(0u, t.to_odd, is_odd);
-    let y = place.first * snake.unit + index / per * (t.height + 1u);
+    let y = extent.first * snake.unit + here / per * (t.height + 1u);
     active_triangles[i].index = index;
     active_triangles[i].at = x | (y << 16u);
     active_triangles[i].shape = shape | select(0u, ODD, is_odd);
@@ -135,14 +139,14 @@ fn assign(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups)
     for (var j = run * RUN; j < end; j++) {
         let i = requests[j];
         let bin = active_triangles[i].shape & BIN;
-        if (state.places[bin].superblock == NONE) {
+        if (state.rooms[bin].capacity == 0u) {
             drop_slot(i);
             continue;
         }
         let first = plans[bin].first_word;
         let nth = free_before[first] + j - plans[bin].first_request;
         var low = first;
-        var high = first + (capacity_now(bin) + 31u) / 32u - 1u;
+        var high = first + (state.rooms[bin].capacity + 31u) / 32u - 1u;
         while (low < high) {
             let middle = (low + high + 1u) / 2u;
             if (free_before[middle] <= nth) {

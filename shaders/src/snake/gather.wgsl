@@ -51,7 +51,7 @@ fn scan_active(@builtin(local_invocation_index) lane: u32) {
     }
     for (var bin = lane; bin < BINS; bin += LANES) {
         if (snake.reset != 0u) {
-            state.places[bin].superblock = NONE;
+            state.rooms[bin] = Room(0u, 0u);
         }
     }
     if (lane == LANES - 1u) {

@@ -8,7 +8,7 @@ const RANGE: u32 = 2u;
 const FIRST_COARSE: u32 = 4u;
 
 fn is_sink(bin: u32) -> bool {
-    return state.places[bin].superblock != NONE || atomicLoad(&tally.demand[bin]) > in_row(bin, snake.least_width);
+    return state.rooms[bin].capacity != 0u || atomicLoad(&tally.demand[bin]) > in_row(bin, snake.least_width);
 }
 
 fn mapped(source: u32) -> u32 {

@@ -24,13 +24,18 @@
 //! anew in every frame unless the visible set changes by less than 5 %. We differ
 //! in never moving a triangle within its bin, because accumulated light would
 //! move with it; below 5 % triangles do not change bins either, and bins
-//! not their rows, for a few frames.
+//! not their rows, for a few frames. Bins may lie in several pieces, and so a 16th of
+//! spare slots does where the original needs 30 %.
 
+mod assign;
 mod bins;
+mod columns;
 mod footprint;
+mod lay;
 mod mapping;
 mod place;
 mod scale;
+mod sheet;
 mod superblocks;
 
 use bytemuck::{Pod, Zeroable};
@@ -39,13 +44,13 @@ pub use bins::{
     BIN, BINS, FORM, LONGEST, OCTAVE, PIXEL, SIZES, Template, Wish, bin_of, is_near, parts,
     size_borders, templates,
 };
+pub use columns::{MOST_LOOKS, MOST_SUPERBLOCKS, Superblock, UNIT_WORDS};
 pub use footprint::{NO_TURN, SnakeFootprintParameters, snake_footprint};
 pub use mapping::map_bin;
 pub use place::{Outcome, Packer, Seen};
 pub use scale::{BIAS_STEP, CELLS, DEAD_BAND, MOST_BIAS, least_bias};
-pub use superblocks::{
-    MOST_LARGE, MOST_LOOKS, MOST_SUPERBLOCKS, Place, Sheet, Superblock, Superblocks, UNIT_WORDS,
-};
+pub use sheet::{MOST_LARGE, Sheet};
+pub use superblocks::{Extent, MOST_EXTENTS, Superblocks, capacity_of};
 
 /// Kernels `count_active`, `scan_active`, `gather`, `leave_out`, `choose_scale`,
 /// `choose_bins`, `map_bins`, `choose_targets`, `superblocks`, `scan_slots`,
@@ -58,7 +63,9 @@ pub const SOURCE: &str = concat!(
     include_str!("scale.wgsl"),
     include_str!("mapping.wgsl"),
     include_str!("request.wgsl"),
+    include_str!("columns.wgsl"),
     include_str!("superblocks.wgsl"),
+    include_str!("lay.wgsl"),
     include_str!("sort.wgsl"),
     include_str!("assign.wgsl"),
 );
@@ -86,10 +93,11 @@ pub const COLLAPSE_SHARE: u32 = 8;
 /// hold: half an octave, then one, then two, then all that there is.
 pub const RAISES: [i32; 4] = [128, 256, 512, MOST_BIAS];
 
-/// Triangles that a bin gets room for: 30 % to spare (section 3.6).
+/// Triangles that a bin gets room for: a 16th to spare, and what its last row has
+/// besides.
 #[must_use]
 pub fn with_spare(triangles: u32) -> u32 {
-    triangles + 3 * triangles / 10
+    triangles + triangles / 16
 }
 
 /// Words of `SnakeTally` in `records.wgsl`.
@@ -232,7 +240,7 @@ pub struct SnakeState {
 
 impl SnakeState {
     /// Bytes of the state with what the CPU never reads: units of each superblock;
-    /// superblock, first unit, units and capacity of each bin; a list of bins.
-    pub const BYTES: u64 =
-        size_of::<Self>() as u64 + (MOST_SUPERBLOCKS * UNIT_WORDS * 4 + BINS * 20) as u64;
+    /// superblock, first unit, units and capacity of each extent; a list of bins.
+    pub const BYTES: u64 = size_of::<Self>() as u64
+        + (MOST_SUPERBLOCKS * UNIT_WORDS * 4 + BINS * (8 + MOST_EXTENTS * 16 + 4)) as u64;
 }

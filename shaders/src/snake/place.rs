@@ -1,13 +1,12 @@
 //! The twin of all kernels of the snake: one call a frame.
 
 use super::{
-    ActiveTriangle, BIN, BINS, COLLAPSE_SHARE, DEAD_BAND, FORM, FREEZE_FRAMES, MOST_BIAS,
-    MOST_LARGE, NONE, ODD, Place, RAISES, SMALL_CHANGE, SnakeParameters, Superblock, Superblocks,
-    Template, Wish, bin_of,
+    ActiveTriangle, BIN, BINS, DEAD_BAND, Extent, FORM, FREEZE_FRAMES, MOST_BIAS, NONE, ODD,
+    RAISES, SMALL_CHANGE, SnakeParameters, Superblock, Superblocks, Template, Wish, bin_of,
     bins::{TURN, is_foreshortened_alike},
     bits, is_near, least_bias, map_bin,
     scale::{CELLS, cell},
-    status, templates, with_spare,
+    status, templates,
 };
 use crate::atlas::importance;
 
@@ -44,47 +43,54 @@ pub struct Outcome {
 /// Who has which slot.
 #[derive(Clone, Debug)]
 pub struct Packer {
-    templates: Vec<Template>,
-    superblocks: Superblocks,
-    places: Vec<Option<Place>>,
+    pub(super) templates: Vec<Template>,
+    pub(super) superblocks: Superblocks,
+    pub(super) places: Vec<Vec<Extent>>,
     /// Triangles that have a slot, ascending.
     residents: Vec<ActiveTriangle>,
     frozen_for: u32,
 }
 
 /// A triangle of this frame.
-struct Active {
-    record: ActiveTriangle,
+pub(super) struct Active {
+    pub(super) record: ActiveTriangle,
     wish: Wish,
     /// Shape of the slot that it had.
     old: u32,
     /// The bin that it would choose, or has.
-    bin: u32,
+    pub(super) bin: u32,
 }
 
 impl Active {
-    fn is(&self, bit: u32) -> bool {
+    pub(super) fn is(&self, bit: u32) -> bool {
         self.record.bits & bit != 0
     }
 }
 
 /// What is counted of the triangles of a bin.
 #[derive(Clone, Copy, Default)]
-struct Count {
+pub(super) struct Count {
     wants: u32,
     stays: u32,
-    idles: u32,
+    pub(super) idles: u32,
     /// Behind the last slot that is in use.
-    end: u32,
+    pub(super) end: u32,
+}
+
+impl Count {
+    /// Visible triangles.
+    pub(super) fn need(self) -> u32 {
+        self.stays + self.wants
+    }
 }
 
 /// What becomes of a bin.
 #[derive(Clone, Copy, Default)]
-struct Plan {
+pub(super) struct Plan {
     /// Was given rows in this frame, or has lost them.
-    moved: bool,
+    pub(super) moved: bool,
     /// Triangles out of sight give their slots back.
-    evicts: bool,
+    pub(super) evicts: bool,
 }
 
 impl Packer {
@@ -94,7 +100,7 @@ impl Packer {
         Self {
             templates: templates(),
             superblocks: Superblocks::new(parameters.sheet()),
-            places: vec![None; BINS],
+            places: vec![Vec::new(); BINS],
             residents: Vec::new(),
             frozen_for: 0,
         }
@@ -135,20 +141,16 @@ impl Packer {
         self.residents = active.iter().map(|active| active.record).collect();
         self.residents.retain(|record| record.shape != NONE);
         outcome.active = active.into_iter().map(|active| active.record).collect();
-        for place in self.places.iter().flatten() {
-            let width = self.superblocks.blocks()[place.superblock as usize].width;
-            outcome.reserved[0] += 1;
-            outcome.reserved[1] += place.units * parameters.unit * width;
-            outcome.reserved[2] += place.capacity;
+        for extents in &self.places {
+            outcome.reserved[0] += u32::from(!extents.is_empty());
+            for extent in extents {
+                let width = self.superblocks.blocks()[extent.superblock as usize].width;
+                outcome.reserved[1] += extent.units * parameters.unit * width;
+                outcome.reserved[2] += extent.capacity;
+            }
         }
         outcome.superblocks = self.superblocks.blocks().to_vec();
         outcome
-    }
-
-    /// Where a bin lies.
-    #[must_use]
-    pub fn bin_place(&self, bin: u32) -> Option<Place> {
-        self.places[bin as usize]
     }
 
     /// The visible triangles and those that have a slot, by ascending patch.
@@ -210,7 +212,7 @@ impl Packer {
         parameters: &SnakeParameters,
         outcome: &mut Outcome,
     ) -> Vec<Plan> {
-        self.superblocks.begin();
+        self.superblocks.columns.begin();
         if parameters.reset == 0 {
             let counts = self.request(active, parameters, outcome, false);
             if let Ok(plans) = self.lay_bins(&counts, outcome.status & status::FROZEN != 0) {
@@ -222,8 +224,8 @@ impl Packer {
         self.frozen_for = 0;
         let mut raises = RAISES.iter();
         loop {
-            self.superblocks.clear();
-            self.places.fill(None);
+            self.superblocks.columns.clear();
+            self.places.fill(Vec::new());
             let counts = self.request(active, parameters, outcome, true);
             let raise = match (self.lay_bins(&counts, false), raises.next()) {
                 (Ok(plans), _) | (Err(plans), None) => return plans,
@@ -268,7 +270,7 @@ impl Packer {
         }
         let is_sink = |bin: u32| {
             let row = self.templates[bin as usize].in_row(parameters.least_width);
-            self.places[bin as usize].is_some() || demand[bin as usize] > row
+            !self.places[bin as usize].is_empty() || demand[bin as usize] > row
         };
         let mapping: Vec<u32> = (0..BINS as u32)
             .map(|bin| match demand[bin as usize] {
@@ -281,136 +283,6 @@ impl Packer {
             choose_target(active, &mapping, &mut counts, parameters, frozen, anew);
         }
         counts
-    }
-
-    /// Algorithm 2. With bins that found no room, the plans are an error.
-    fn lay_bins(&mut self, counts: &[Count], frozen: bool) -> Result<Vec<Plan>, Vec<Plan>> {
-        let mut plans = vec![Plan::default(); BINS];
-        for bin in (0..BINS).rev() {
-            let (template, count) = (&self.templates[bin], counts[bin]);
-            let Some(place) = &mut self.places[bin] else {
-                continue;
-            };
-            let need = count.stays + count.wants;
-            plans[bin].evicts = need + count.idles > place.capacity;
-            let live = if plans[bin].evicts {
-                need
-            } else {
-                need + count.idles
-            };
-            let mut gone = live == 0
-                || need > place.capacity
-                    && !self.superblocks.grow(template, place, with_spare(need));
-            if !gone && !frozen && live * 2 < place.capacity {
-                let least = with_spare(live);
-                if count.end <= least {
-                    self.superblocks.shrink(template, place, least);
-                } else {
-                    gone = self.superblocks.is_sparse(template, place, least);
-                }
-            }
-            if gone {
-                self.superblocks.release(*place);
-                self.places[bin] = None;
-                plans[bin].moved = true;
-            }
-        }
-        if !frozen {
-            self.collapse(&mut plans);
-        }
-        self.superblocks.drop_last();
-        let mut is_full = false;
-        for (bin, triangles) in self.homeless(counts) {
-            self.places[bin] = self.superblocks.place(&self.templates[bin], triangles);
-            plans[bin].moved = true;
-            is_full |= self.places[bin].is_none();
-        }
-        if is_full { Err(plans) } else { Ok(plans) }
-    }
-
-    /// Bins that ask for rows, and for how many triangles, in their order.
-    fn homeless(&self, counts: &[Count]) -> Vec<(usize, u32)> {
-        let need = |bin: usize| with_spare(counts[bin].stays + counts[bin].wants);
-        let asks = |bin: &usize| self.places[*bin].is_none() && need(*bin) > 0;
-        let area = |bin: usize| self.superblocks.area(&self.templates[bin], need(bin));
-        let (mut large, small): (Vec<usize>, Vec<usize>) =
-            ((0..BINS).rev().filter(asks)).partition(|&bin| self.superblocks.is_large(area(bin)));
-        if large.len() <= MOST_LARGE {
-            large.sort_by_key(|&bin| std::cmp::Reverse(area(bin)));
-        }
-        let all = large.into_iter().chain(small);
-        all.map(|bin| (bin, need(bin))).collect()
-    }
-
-    /// Empties superblocks that have become nearly empty.
-    fn collapse(&mut self, plans: &mut [Plan]) {
-        let units = self.superblocks.sheet().units;
-        let mut collapses = Vec::new();
-        for block in self.superblocks.blocks_mut() {
-            let falls =
-                block.used * COLLAPSE_SHARE < units && block.peak * COLLAPSE_SHARE >= 2 * units;
-            collapses.push(falls);
-        }
-        for (place, plan) in self.places.iter_mut().zip(plans) {
-            if let Some(gone) = place.take_if(|place| collapses[place.superblock as usize]) {
-                self.superblocks.release(gone);
-                plan.moved = true;
-            }
-        }
-        for (block, falls) in self.superblocks.blocks_mut().iter_mut().zip(collapses) {
-            if falls {
-                block.peak = 0;
-            }
-        }
-    }
-
-    /// Each triangle that wants a slot gets the next free one of its bin.
-    fn assign(&mut self, active: &mut [Active], plans: &[Plan], parameters: &SnakeParameters) {
-        let slots = |bin: usize| self.places[bin].map_or(0, |place| place.capacity as usize);
-        let mut taken: Vec<Vec<bool>> = (0..BINS).map(|bin| vec![false; slots(bin)]).collect();
-        for active in active.iter_mut() {
-            let plan = plans[active.bin as usize];
-            let record = &mut active.record;
-            let is_idle = record.bits & bits::IDLE != 0;
-            if record.bits & bits::KEPT != 0 && plan.moved {
-                record.bits = record.bits & !bits::KEPT | bits::WANTED | bits::CHANGED;
-            } else if is_idle && (plan.moved || plan.evicts) {
-                record.shape = NONE;
-            } else if is_idle || record.bits & bits::KEPT != 0 {
-                taken[active.bin as usize][record.index as usize] = true;
-                self.set_slot(record, active.bin, parameters);
-            }
-        }
-        let mut next = vec![0_usize; BINS];
-        for active in active.iter_mut().filter(|active| active.is(bits::WANTED)) {
-            let bin = active.bin as usize;
-            let free = taken[bin].iter().skip(next[bin]).position(|taken| !taken);
-            let Some(free) = free else {
-                active.record.shape = NONE;
-                active.record.bits &= !bits::CHANGED;
-                continue;
-            };
-            active.record.index = (next[bin] + free) as u32;
-            next[bin] += free + 1;
-            self.set_slot(&mut active.record, active.bin, parameters);
-        }
-    }
-
-    /// Tells where a slot lies.
-    fn set_slot(&self, record: &mut ActiveTriangle, bin: u32, parameters: &SnakeParameters) {
-        let Some(place) = self.places[bin as usize] else {
-            return;
-        };
-        let template = &self.templates[bin as usize];
-        let block = self.superblocks.blocks()[place.superblock as usize];
-        let per = template.in_row(block.width);
-        let (row, column) = (record.index / per, record.index % per);
-        let is_odd = column % 2 == 1;
-        let pair = template.to_odd + template.to_even;
-        let x = block.x + column / 2 * pair + if is_odd { template.to_odd } else { 0 };
-        let y = place.first * parameters.unit + row * (template.height + 1);
-        record.at = x | y << 16;
-        record.shape = record.shape & !ODD | if is_odd { ODD } else { 0 };
     }
 }
 

@@ -46,12 +46,17 @@ struct ActiveTriangle {
     at: u32,
 }
 
-// Where a bin lies.
-struct Place {
-    // Or NONE.
+// Rows of a superblock that a bin has: first unit, units, triangles that have room.
+struct Extent {
     superblock: u32,
     first: u32,
     units: u32,
+    capacity: u32,
+}
+
+// How many extents a bin has, and triangles that have room in all of them.
+struct Room {
+    extents: u32,
     capacity: u32,
 }
 
@@ -84,7 +89,9 @@ struct SnakeState {
     superblocks: array<Superblock, 32>,
     // Units of each superblock that are taken.
     rows: array<u32, 512>,
-    places: array<Place, 720>,
+    rooms: array<Room, 720>,
+    // Of each bin, one after another.
+    extents: array<Extent, 5760>,
     list: array<u32, 720>,
 }
 
@@ -117,6 +124,7 @@ struct SnakeTally {
 
 const NONE: u32 = 0xffffffffu;
 const BINS: u32 = 720u;
+const MOST_EXTENTS: u32 = 8u;
 const CELLS: u32 = 1280u;
 
 // Bits of ActiveTriangle.bits.
