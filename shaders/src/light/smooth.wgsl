@@ -18,9 +18,15 @@ const RADIUS: i32 = 3;
 // Relative error that smoothing is believed to make: a texel whose own is far
 // below it stands for itself.
 const SMOOTHING_ERROR: f32 = 0.08;
-// Standard deviations of difference that still count as noise. Three of them took
-// corners and what lies hidden behind a step for noise, and darkened the steps.
-const TOLERANCE: f32 = 1.0;
+// Standard deviations of difference that still count as noise: of a few samples, which
+// know little of their own variance, and of many. Where many kept as wide a tolerance,
+// corners and what lies hidden behind a step counted as noise, and darkened the steps.
+const TOLERANCE: f32 = 3.0;
+const FIRM_TOLERANCE: f32 = 1.0;
+// Samples half way between both: a compromise of the demo, where paths are rare, and
+// of `sequence` at six a pixel.
+const FIRM_SAMPLES: f32 = 12.0;
+
 // Relative standard deviation that a sample has at least. Reflections of wide lamps
 // have hardly any, and shapes that smoothing would take from them.
 const LEAST_NOISE: f32 = 0.8;
@@ -49,9 +55,11 @@ fn own_share(variance: f32, samples: f32, least_noise: f32, smoothed: f32) -> f3
     return believed / max(believed + max(variance, least), 1e-20);
 }
 
-// How much a neighbour counts whose mean differs by `difference`.
-fn likeness(difference: f32, variance: f32) -> f32 {
-    return exp(-difference * difference / (TOLERANCE * TOLERANCE * max(variance, 1e-8)));
+// How much a neighbour counts whose mean differs by `difference`, for a texel of
+// `samples` samples.
+fn likeness(difference: f32, variance: f32, samples: f32) -> f32 {
+    let tolerance = mix(FIRM_TOLERANCE, TOLERANCE, FIRM_SAMPLES / (FIRM_SAMPLES + samples));
+    return exp(-difference * difference / (tolerance * tolerance * max(variance, 1e-8)));
 }
 
 // The interpolated vertex normal of a slot's surface at `p`, in texels from the middle
@@ -153,8 +161,8 @@ fn smooth_slots(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                     let other_variance = vec2<f32>(variance_of(other_mean.x, moments[near].y, other.w),
                         variance_of(other_mean.y, moments[near].z, other_glossy.w));
                     let weight = vec2<f32>(
-                        other.w * likeness(other_mean.x - mean.x, variance.x + other_variance.x),
-                        other_glossy.w * likeness(other_mean.y - mean.y, variance.y + other_variance.y));
+                        other.w * likeness(other_mean.x - mean.x, variance.x + other_variance.x, here.w),
+                        other_glossy.w * likeness(other_mean.y - mean.y, variance.y + other_variance.y, shiny.w));
                     sum += other.rgb * weight.x;
                     sum_glossy += other_glossy.rgb * weight.y;
                     weights += weight;
