@@ -136,7 +136,7 @@ impl Activity {
                     tracing::info!("paused");
                     self.is_paused = true;
                 }
-                MainEvent::InitWindow { .. } => {
+                MainEvent::InitWindow { .. } | MainEvent::WindowResized { .. } => {
                     tracing::info!("a window is there");
                     outcome = on_screen(ScreenEvent::Window(app.native_window()));
                 }

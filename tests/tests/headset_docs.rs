@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use shadecast_client::Status;
+use shadecast_client::render::Optics;
 use shadecast_protocol::ResetReason;
 
 fn root() -> PathBuf {
@@ -177,15 +178,24 @@ fn names_on_the_page_are_those_of_the_sources() {
     assert!(page.contains(&format!(
         "/sdcard/Android/data/{application}/files/server.txt"
     )));
-    let settings = read(&root().join("android-client/src/settings.rs"));
+    let settings = read(&root().join("client/src/settings.rs"));
     assert!(settings.contains(r#"FILE: &str = "server.txt""#));
-    assert!(settings.contains(r#"new_string("server")"#) && page.contains("--es server"));
+    let java = read(&root().join("android-client/src/java.rs"));
+    assert!(java.contains(r#"new_string("server")"#) && page.contains("--es server"));
+    let phone = read(&root().join("android-client/src/phone.rs"));
+    assert!(phone.contains(&format!(r#"PACKAGE: &str = "{application}""#)));
+    assert!(phone.contains(r#"FILE: &str = "viewer.json""#) && page.contains("`viewer.json`"));
+    let viewer = page
+        .lines()
+        .find(|line| line.starts_with("{\"between_lenses\""));
+    let viewer: Optics = serde_json::from_str(viewer.expect("a viewer")).expect("of these names");
+    assert_eq!(viewer, Optics::CARDBOARD);
     let library = read(&root().join("android-client/src/lib.rs"));
     assert!(library.contains("shadecast {} begins") && page.contains("shadecast 0.1.0 begins"));
     assert!(page.contains(&format!("shadecast {} begins", env!("CARGO_PKG_VERSION"))));
     for path in [
         "client/src/render/foreign/sampler.rs",
-        "android-client/src/images.rs",
+        "client/src/render/foreign/hardware_buffer.rs",
         "android-client/src/codec.rs",
     ] {
         let name = path.rsplit('/').next().expect("a file");

@@ -105,7 +105,7 @@ impl Viewer {
     /// comes from `frames`.
     ///
     /// # Errors
-    /// When there is no device that can draw, or no such viewer.
+    /// When there is no device that can draw, or the viewer is none that can be worn.
     pub fn open(config: ViewerConfig, frames: FrameReceiver) -> Result<Self, ViewerError> {
         config.optics.checked()?;
         Ok(Self {
@@ -119,16 +119,24 @@ impl Viewer {
     }
 
     /// A window of `size` pixels to draw into; the one before is not touched again.
+    /// One that does not fit behind the lenses stays black, and the log says so: while
+    /// a phone is turned, its window may be upright for a moment.
     ///
     /// # Errors
-    /// When it cannot be drawn into, or does not fit behind the lenses.
+    /// When it cannot be drawn into.
     pub fn set_window(
         &mut self,
         window: impl HasWindowHandle + Send + Sync + 'static,
         size: [u32; 2],
     ) -> Result<(), ViewerError> {
         self.drop_window();
-        let eyes = self.config.optics.eyes(size, self.config.screen)?;
+        let eyes = match self.config.optics.eyes(size, self.config.screen) {
+            Ok(eyes) => eyes,
+            Err(error) => {
+                tracing::warn!("{error}");
+                return Ok(());
+            }
+        };
         let gpu = &self.vulkan.gpu;
         let surface = self.vulkan.api.create_surface(Window(window));
         let surface = surface.map_err(ScreenError::from)?;

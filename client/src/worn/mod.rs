@@ -2,9 +2,8 @@
 //! a viewer.
 //!
 //! Both show what is [`Held`] of the world, pass a display frame a turn, and say
-//! where the head is; how differs ([`openxr`](crate::openxr),
-//! [`viewer`](crate::viewer)). [`HeadsetClient`] runs either together with the
-//! thread that talks to the server.
+//! where the head is; how differs (`openxr`, `viewer`). `HeadsetClient` runs either
+//! together with the thread that talks to the server.
 
 #[cfg(feature = "network")]
 mod client;
