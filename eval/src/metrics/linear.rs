@@ -17,7 +17,8 @@ pub fn rmse(found: &[Vec3], reference: &[Vec3]) -> f64 {
 
 /// Mean squared difference relative to the reference's square (Rousselle et al.,
 /// 2011), with an epsilon of a hundredth of the reference's mean square, so that
-/// the unit of radiance does not matter.
+/// the unit of radiance does not matter. Where the reference is all black, any light
+/// is infinitely too much.
 #[must_use]
 pub fn relmse(found: &[Vec3], reference: &[Vec3]) -> f64 {
     let count = (found.len() * 3) as f64;
@@ -25,7 +26,11 @@ pub fn relmse(found: &[Vec3], reference: &[Vec3]) -> f64 {
         .map(|(_, square)| square)
         .sum::<f64>()
         / count;
-    let epsilon = (DARK * mean_square).max(f64::MIN_POSITIVE);
+    if mean_square == 0.0 {
+        let is_black = found.iter().all(|light| *light == Vec3::ZERO);
+        return if is_black { 0.0 } else { f64::INFINITY };
+    }
+    let epsilon = DARK * mean_square;
     let sum: f64 = squared_differences(found, reference)
         .map(|(difference, square)| difference / (square + epsilon))
         .sum();
@@ -59,5 +64,6 @@ mod tests {
         let in_another_unit = relmse(&scaled(&found), &scaled(&reference));
         assert!((in_another_unit - relmse(&found, &reference)).abs() < 1e-6);
         assert_eq!(relmse(&[Vec3::ZERO], &[Vec3::ZERO]), 0.0);
+        assert_eq!(relmse(&[Vec3::X], &[Vec3::ZERO]), f64::INFINITY);
     }
 }

@@ -94,8 +94,7 @@ fn means(found: &Measured) -> String {
     for budget in budgets(found) {
         for method in &METHODS {
             let mean = |method, of_row: Of| mean(of(found, method, budget).map(of_row));
-            let relative =
-                |of_row: Of| format!("{:.2}", mean(ours, of_row) / mean(method.name, of_row));
+            let relative = |of_row: Of| ratio(mean(ours, of_row), mean(method.name, of_row));
             let work = of(found, method.name, budget)
                 .next()
                 .map_or(0, |row| row.work);
@@ -125,4 +124,14 @@ fn means(found: &Measured) -> String {
         "our relMSE over its",
     ];
     table(&columns, rows.into_iter())
+}
+
+/// In words of a table; none where there is nothing to compare with.
+fn ratio(ours: f64, theirs: f64) -> String {
+    let ratio = ours / theirs;
+    if ratio.is_finite() {
+        format!("{ratio:.2}")
+    } else {
+        "–".into()
+    }
 }
