@@ -1,7 +1,7 @@
 //! Everything a shadecast client does on every platform: the sans-IO session
 //! that pairs pictures with updates, and behind features the decoder, the
-//! renderer, the thread that talks to the server and the frame loop of a
-//! headset.
+//! renderer, the thread that talks to the server and the frame loops of a headset
+//! and of a phone in a viewer.
 
 mod clock;
 mod decode;

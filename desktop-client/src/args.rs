@@ -135,14 +135,16 @@ impl Args {
 
     /// Of a phone in a viewer, whose screen is as wide as two pictures.
     fn phone(&self) -> Option<Eyes> {
+        if self.lens != "cardboard" {
+            return None;
+        }
         let side = u32::from(self.eye_size);
         let screen = PhoneScreen {
             pixels_an_inch: [side as f32 / 0.065 * 0.0254; 2],
             rate: self.display_rate() as f32,
             quarters: 1,
         };
-        let is_asked = self.lens == "cardboard";
-        is_asked.then(|| Optics::CARDBOARD.eyes([2 * side, side], screen).ok())?
+        Optics::CARDBOARD.eyes([2 * side, side], screen).ok()
     }
 
     /// None where the lens pass is skipped.

@@ -7,6 +7,7 @@
 
 mod tracker;
 
+use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Duration;
 
@@ -51,10 +52,11 @@ pub enum ViewerError {
 /// # Errors
 /// When it is something else, or no viewer that can be worn; names the file.
 pub fn read_optics(path: &Path) -> Result<Optics, ViewerError> {
-    let Ok(text) = std::fs::read_to_string(path) else {
-        return Ok(Optics::CARDBOARD);
-    };
     let named = |why: String| ViewerError::File(path.display().to_string(), why);
+    let text = match std::fs::read_to_string(path) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Optics::CARDBOARD),
+        text => text.map_err(|error| named(error.to_string()))?,
+    };
     let optics: Optics = serde_json::from_str(&text).map_err(|error| named(error.to_string()))?;
     optics.checked().map_err(|error| named(error.to_string()))
 }
@@ -229,7 +231,7 @@ impl Display for Viewer {
             Ok(None) => return Ok(Turn::Idle),
             Err(error) => {
                 tracing::warn!("{error}");
-                self.shown = None;
+                self.drop_window();
                 return Ok(Turn::Lost);
             }
         };
@@ -325,6 +327,8 @@ mod tests {
                 "{error}"
             );
         }
+        std::fs::write(&path, [0xff; 4]).unwrap();
+        assert!(read().unwrap_err().contains(".json: "), "no text");
         std::fs::remove_file(&path).unwrap();
     }
 

@@ -37,7 +37,7 @@ use crate::{
 };
 
 /// Triangles of the scene, and whether large ones are split as for streaming: for
-/// about 1,000, 10,000 and 100,000 patches asked for.
+/// about 1,900, 25,000 and 222,000 patches asked for.
 const WALKS: [(usize, bool); 3] = [(7_000, false), (110_000, true), (1_300_000, true)];
 /// Of these walks and of the sizes below, those of a quick run.
 const QUICK_WALKS: usize = 2;

@@ -8,7 +8,7 @@ use wgpu::ShaderStages;
 use super::policy::AtlasShape;
 use crate::{
     gpu::{Binding, Gpu, GpuError, bind, layout, workgroups},
-    packer::passes::{Outcomes, Threads},
+    packer::passes::{CountsActive, Outcomes, Threads},
 };
 
 /// Threads of a group, where a thread has a run of patches.
@@ -62,11 +62,10 @@ pub(super) struct Passes {
     parameters: wgpu::Buffer,
     wishes: wgpu::Buffer,
     blocks: wgpu::Buffer,
-    active: wgpu::Buffer,
     tally: wgpu::Buffer,
     state: wgpu::Buffer,
     held: wgpu::Buffer,
-    outcomes: Outcomes<AtlasState, ActivePatch>,
+    pub(super) outcomes: Outcomes<AtlasState, ActivePatch>,
     shape: AtlasShape,
     patches: u32,
     run: u32,
@@ -152,6 +151,7 @@ impl Passes {
             kernels.push((name, kernel, groups));
         }
         let passes = Self {
+            outcomes: Outcomes::new(gpu, &state, &active, patches),
             kernels: (kernels.into_iter())
                 .map(|(_, kernel, groups)| (kernel, groups))
                 .collect(),
@@ -159,11 +159,9 @@ impl Passes {
             parameters,
             wishes,
             blocks,
-            active,
             tally,
             state,
             held,
-            outcomes: Outcomes::new(gpu, patches),
             shape,
             patches,
             run,
@@ -250,19 +248,10 @@ impl Passes {
         pass.set_pipeline(kernel);
         pass.dispatch_workgroups(x, y, 1);
     }
+}
 
-    /// Submits the recorded work and reads what became of it.
-    pub(super) fn submit_and_read(
-        &mut self,
-        gpu: &Gpu,
-        encoder: wgpu::CommandEncoder,
-    ) -> Result<(AtlasState, Vec<ActivePatch>), GpuError> {
-        let Self {
-            outcomes,
-            state,
-            active,
-            ..
-        } = self;
-        outcomes.read(gpu, encoder, state, active, |state| state.active_count)
+impl CountsActive for AtlasState {
+    fn active_count(&self) -> u32 {
+        self.active_count
     }
 }

@@ -121,7 +121,7 @@ impl Atlas {
     }
 
     fn read(&mut self, gpu: &Gpu, encoder: wgpu::CommandEncoder) -> Result<Placed, GpuError> {
-        let (state, active) = self.passes.submit_and_read(gpu, encoder)?;
+        let (state, active) = self.passes.outcomes.submit_and_read(gpu, encoder)?;
         let outcome = Outcome {
             active,
             visible: state.visible,

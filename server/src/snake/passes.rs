@@ -8,7 +8,7 @@ use wgpu::ShaderStages;
 use super::policy::SnakeShape;
 use crate::{
     gpu::{Binding, Gpu, GpuError, bind, layout, workgroups},
-    packer::passes::{Outcomes, Threads},
+    packer::passes::{CountsActive, Outcomes, Threads},
 };
 
 /// Threads of a group, where a thread has a run of triangles.
@@ -70,11 +70,10 @@ pub(super) struct Passes {
     parameters: wgpu::Buffer,
     wishes: wgpu::Buffer,
     slots: wgpu::Buffer,
-    active: wgpu::Buffer,
     tally: wgpu::Buffer,
     taken: wgpu::Buffer,
     state: wgpu::Buffer,
-    outcomes: Outcomes<SnakeState, ActiveTriangle>,
+    pub(super) outcomes: Outcomes<SnakeState, ActiveTriangle>,
     patches: u32,
     run: u32,
 }
@@ -164,6 +163,7 @@ impl Passes {
             kernels.push((name, kernel, groups));
         }
         let passes = Self {
+            outcomes: Outcomes::new(gpu, &state, &active, patches),
             kernels: (kernels.into_iter())
                 .map(|(_, kernel, groups)| (kernel, groups))
                 .collect(),
@@ -171,11 +171,9 @@ impl Passes {
             parameters,
             wishes,
             slots,
-            active,
             tally,
             taken,
             state,
-            outcomes: Outcomes::new(gpu, patches),
             patches,
             run,
         };
@@ -241,19 +239,10 @@ impl Passes {
         pass.set_pipeline(kernel);
         pass.dispatch_workgroups(x, y, 1);
     }
+}
 
-    /// Submits the recorded work and reads what became of it.
-    pub(super) fn submit_and_read(
-        &mut self,
-        gpu: &Gpu,
-        encoder: wgpu::CommandEncoder,
-    ) -> Result<(SnakeState, Vec<ActiveTriangle>), GpuError> {
-        let Self {
-            outcomes,
-            state,
-            active,
-            ..
-        } = self;
-        outcomes.read(gpu, encoder, state, active, |state| state.active_count)
+impl CountsActive for SnakeState {
+    fn active_count(&self) -> u32 {
+        self.active_count
     }
 }

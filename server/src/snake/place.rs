@@ -80,7 +80,7 @@ impl Snake {
     }
 
     fn read(&mut self, gpu: &Gpu, encoder: wgpu::CommandEncoder) -> Result<Placed, GpuError> {
-        let (state, active) = self.passes.submit_and_read(gpu, encoder)?;
+        let (state, active) = self.passes.outcomes.submit_and_read(gpu, encoder)?;
         let count = state.superblock_count as usize;
         let superblocks = state.superblocks.iter().take(count);
         let outcome = Outcome {

@@ -71,7 +71,7 @@ impl Tss {
     ) -> Result<Placed, GpuError> {
         self.passes
             .record(gpu, gpu_scene, &mut encoder, eyes, pixels_per_radian);
-        let (state, active) = self.passes.submit_and_read(gpu, encoder)?;
+        let (state, active) = self.passes.outcomes.submit_and_read(gpu, encoder)?;
         Ok(self.told.placed(&state, &active))
     }
 }

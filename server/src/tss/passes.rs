@@ -10,7 +10,7 @@ use wgpu::ShaderStages;
 use crate::{
     atlas::KEEP_UNSEEN,
     gpu::{Binding, Gpu, GpuError, GpuScene, bind, layout, workgroups},
-    packer::passes::{Outcomes, Threads},
+    packer::passes::{CountsActive, Outcomes, Threads},
     patches::PatchedScene,
 };
 
@@ -53,10 +53,8 @@ pub(super) struct Passes {
     group: wgpu::BindGroup,
     #[cfg(test)]
     shapes: wgpu::Buffer,
-    active: wgpu::Buffer,
     tally: wgpu::Buffer,
-    state: wgpu::Buffer,
-    outcomes: Outcomes<TssState, ActiveTriangle>,
+    pub(super) outcomes: Outcomes<TssState, ActiveTriangle>,
     patches: u32,
     run: u32,
 }
@@ -157,6 +155,7 @@ impl Passes {
             bytemuck::bytes_of(&parameters_of(patches, size)),
         );
         Ok(Self {
+            outcomes: Outcomes::new(gpu, &state, &active, patches),
             measure: gpu.compute_pipeline(
                 MEASURE_SOURCE,
                 "measure_triangles",
@@ -170,10 +169,7 @@ impl Passes {
             group,
             #[cfg(test)]
             shapes,
-            active,
             tally,
-            state,
-            outcomes: Outcomes::new(gpu, patches),
             patches,
             run,
         })
@@ -236,21 +232,6 @@ impl Passes {
         }
     }
 
-    /// Submits the recorded work and reads what became of it.
-    pub(super) fn submit_and_read(
-        &mut self,
-        gpu: &Gpu,
-        encoder: wgpu::CommandEncoder,
-    ) -> Result<(TssState, Vec<ActiveTriangle>), GpuError> {
-        let Self {
-            outcomes,
-            state,
-            active,
-            ..
-        } = self;
-        outcomes.read(gpu, encoder, state, active, |state| state.active_count)
-    }
-
     #[cfg(test)]
     pub(super) fn shapes(&self) -> &wgpu::Buffer {
         &self.shapes
@@ -267,5 +248,11 @@ pub(super) fn parameters_of(patches: u32, size: [u16; 2]) -> TssParameters {
         most_class: Class::most(width.min(height)),
         keep_unseen: KEEP_UNSEEN,
         ..TssParameters::default()
+    }
+}
+
+impl CountsActive for TssState {
+    fn active_count(&self) -> u32 {
+        self.active_count
     }
 }

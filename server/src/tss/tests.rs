@@ -259,7 +259,7 @@ impl Both {
         (self.gpu.queue).write_buffer(&self.pixels, 0, bytemuck::cast_slice(&pixels));
         let mut encoder = (self.gpu.device).create_command_encoder(&Default::default());
         self.passes.record_packing(&mut encoder);
-        let placed = self.passes.submit_and_read(&self.gpu, encoder);
+        let placed = self.passes.outcomes.submit_and_read(&self.gpu, encoder);
         placed.expect("a GPU")
     }
 
@@ -344,7 +344,10 @@ fn the_kernel_measures_as_its_twin_does() {
             let mut encoder = gpu.device.create_command_encoder(&Default::default());
             let eyes = vec![eye; scene.scene.objects.len() + 1];
             passes.record(&gpu, &gpu_scene, &mut encoder, &eyes, pixels_per_radian);
-            let (_, active) = passes.submit_and_read(&gpu, encoder).expect("a GPU");
+            let (_, active) = passes
+                .outcomes
+                .submit_and_read(&gpu, encoder)
+                .expect("a GPU");
             check([512; 2], &active);
             let bytes = 0..count as u64 * 8;
             let words: Vec<[u32; 2]> = gpu.read(passes.shapes(), bytes).expect("a GPU");
