@@ -415,8 +415,8 @@ impl Pipeline {
         unlit.retain(|patch, _| !lit.contains_key(patch));
         let lit: Vec<Job> = lit.into_values().collect();
         let unlit: Vec<Job> = unlit.into_values().collect();
-        let noise = (self.light).show(&self.gpu, &self.gpu_scene, &lit, &unlit, viewer)?;
-        self.schedule.measured(&lit, &noise);
+        let qualities = (self.light).show(&self.gpu, &self.gpu_scene, &lit, &unlit, viewer)?;
+        self.schedule.measured(&lit, &qualities);
         self.schedule.shown(&unlit);
         Ok(paths)
     }

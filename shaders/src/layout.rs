@@ -165,7 +165,7 @@ fn layouts_match() {
         eye,
         slot_count,
         atlas_width,
-        seed,
+        tile_count,
         pixel_angle,
         exposure
     );
@@ -173,6 +173,7 @@ fn layouts_match() {
         &atlas,
         BlockRecord,
         first_job,
+        first_tile,
         position,
         layout_bits,
         first_triangle,
@@ -186,6 +187,7 @@ fn layouts_match() {
         &of_triangles,
         TriangleRecord,
         first_job,
+        first_tile,
         layout_bits,
         first_triangle,
         sample_index,
@@ -195,6 +197,7 @@ fn layouts_match() {
         corners,
         weights
     );
+    same_layout!(&atlas, Quality, noise, samples);
     same_layout!(&atlas, Wave, path_count, first_job, cull, step);
     assert_eq!(u64::from(members(&atlas, "PathState").0), STATE_BYTES);
     assert_eq!(u64::from(members(&atlas, "Ray").0) * 3, RAY_BYTES);

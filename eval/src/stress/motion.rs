@@ -24,6 +24,11 @@ pub(super) const CASES: &[Case] = &[
         measure: alternating_light,
     },
     Case {
+        name: "leaping_shadow",
+        what: "a block on a wall, whose shadow leaps as a glowing box does",
+        measure: leaping_shadow,
+    },
+    Case {
         name: "uneven_time",
         what: "updates 5 ms and 5 s apart by turns, and time that starts over",
         measure: uneven_time,
@@ -50,12 +55,15 @@ const PERIOD: Duration = Duration::from_secs(1);
 const NEAR: Duration = Duration::from_millis(250);
 const FAR: Duration = Duration::from_millis(750);
 
+/// The glowing box near to the wall and far from it, out of sight.
+const ABOVE: [Vec3; 2] = [vec3(0.0, 1.5, -2.4), vec3(0.0, 4.0, 1.0)];
+
 fn bounces() -> Integrator {
     Integrator::with_bounces(1)
 }
 
 /// A wall, and a glowing box that leaps; the view shows the wall only.
-fn leaping_lamp() -> (Scene, View) {
+fn leaping_lamp([near, far]: [Vec3; 2]) -> (Scene, View) {
     let mut scene = Scene {
         sky: SkyModel::constant(Vec3::splat(0.02)),
         ..Scene::default()
@@ -72,7 +80,7 @@ fn leaping_lamp() -> (Scene, View) {
         position,
         orientation: Quat::IDENTITY,
     };
-    let (near, far) = (at(vec3(0.0, 1.5, -2.4)), at(vec3(0.0, 4.0, 1.0)));
+    let (near, far) = (at(near), at(far));
     let half = PERIOD / 2;
     let instant = Duration::from_millis(1);
     scene.objects.push(RigidObject {
@@ -115,7 +123,7 @@ fn between(pictures: &[Picture], [near, far]: [f64; 2]) -> Vec<Property> {
 }
 
 fn alternating_light(effort: Effort) -> Result<Vec<Property>> {
-    let (scene, view) = leaping_lamp();
+    let (scene, view) = leaping_lamp(ABOVE);
     let states = states(&scene, view, effort)?;
     let mut watched = Watched::new(&scene, view, bounces(), 1.0)?;
     let mut shown = |frame: u32, in_loop: Duration| watched.shown(PERIOD * frame + in_loop);
@@ -137,8 +145,38 @@ fn alternating_light(effort: Effort) -> Result<Vec<Property>> {
     Ok(properties)
 }
 
+/// Half a second after the box has leapt from one side to the other, at 30 updates a
+/// second, the shadow that came and the one that went have changed: each is on a small
+/// part of a patch.
+fn leaping_shadow(effort: Effort) -> Result<Vec<Property>> {
+    let (mut scene, view) = leaping_lamp([vec3(-0.5, 0.0, -2.2), vec3(0.5, 0.0, -2.2)]);
+    scene.add_box(vec3(0.0, 0.0, -2.7), Vec3::splat(0.12), 0);
+    let mut tracer = Tracer::with(&scene, bounces())?;
+    let truth = tracer.picture_at(view, FAR, effort.samples(1024), effort.seed)?;
+    let mut watched = Watched::new(&scene, view, bounces(), 1.0)?;
+    for _ in 0..30 {
+        watched.shown(NEAR)?;
+    }
+    let before = watched.shown(NEAR)?;
+    let mut after = before.clone();
+    for _ in 0..15 {
+        after = watched.shown(FAR)?;
+    }
+    let mut properties = Vec::new();
+    for (what, columns) in [("that came", 4..6), ("that went", 10..12)] {
+        let mean = |picture: &Picture| picture.part(columns.clone(), 7..9).mean();
+        let missing = (mean(&after) - mean(&truth)) / (mean(&before) - mean(&truth));
+        let name = format!("change still missing of the shadow {what}");
+        properties.push(Property::at_most(name, missing.abs(), 0.15));
+        let changed = (mean(&before) / mean(&truth)).ln().abs();
+        let name = format!("change of the shadow {what}, in powers of e");
+        properties.push(Property::at_least(name, changed, 0.5));
+    }
+    Ok(properties)
+}
+
 fn uneven_time(effort: Effort) -> Result<Vec<Property>> {
-    let (scene, view) = leaping_lamp();
+    let (scene, view) = leaping_lamp(ABOVE);
     let states = states(&scene, view, effort)?;
     let mut watched = Watched::new(&scene, view, bounces(), 1.0)?;
     let mut time = Duration::ZERO;
@@ -155,7 +193,7 @@ fn uneven_time(effort: Effort) -> Result<Vec<Property>> {
 
 fn distant_time(effort: Effort) -> Result<Vec<Property>> {
     const LATE: Duration = Duration::from_secs(1_000_000_000);
-    let (scene, view) = leaping_lamp();
+    let (scene, view) = leaping_lamp(ABOVE);
     let states = states(&scene, view, effort)?;
     let object = &scene.objects[0];
     let mut properties = Vec::new();

@@ -1,6 +1,6 @@
 //! What the cases are built from, and a look at it.
 
-use std::time::Duration;
+use std::{ops::Range, time::Duration};
 
 use anyhow::Result;
 use glam::{Quat, Vec2, Vec3, Vec4, vec3};
@@ -155,6 +155,16 @@ impl Picture {
     pub(super) fn mean(&self) -> f64 {
         let sum: f64 = self.0.iter().map(|pixel| f64::from(pixel.y)).sum();
         sum / self.0.len() as f64
+    }
+
+    /// Of columns and rows, in sixteenths of the picture.
+    pub(super) fn part(&self, columns: Range<usize>, rows: Range<usize>) -> Self {
+        let side = self.0.len().isqrt();
+        let within = |range: &Range<usize>, at: usize| range.contains(&(at * 16 / side));
+        let pixels = self.0.iter().enumerate();
+        let inside =
+            pixels.filter(|(at, _)| within(&columns, at % side) && within(&rows, at / side));
+        Self(inside.map(|(_, pixel)| *pixel).collect())
     }
 
     /// Pixels that are no radiance.

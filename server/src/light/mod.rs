@@ -18,7 +18,7 @@ use shadecast_protocol::{Block, Method, Slot, TriangleSlot};
 use shadecast_shaders::light::{
     ATLAS_OF_TRIANGLES_SOURCE, ATLAS_SOURCE, BlockRecord, CARRY_SOURCE, CARRY_TRIANGLES_SOURCE,
     CELL_BYTES, CELL_COUNT, CarryParameters, JUDGEMENT_BYTES, LightParameters, Move, NO_BLOCK,
-    TriangleMove, TriangleRecord, how,
+    Quality, TriangleMove, TriangleRecord, how,
 };
 use wgpu::ShaderStages;
 
@@ -67,8 +67,9 @@ pub struct Light {
     parameters: wgpu::Buffer,
     kernels: SlotKernels,
     slots: wgpu::Buffer,
-    noise: wgpu::Buffer,
-    noise_readback: wgpu::Buffer,
+    most_tiles: u64,
+    qualities: wgpu::Buffer,
+    qualities_readback: wgpu::Buffer,
     paths: Paths,
     start: wgpu::ComputePipeline,
     change: wgpu::ComputePipeline,
@@ -158,6 +159,8 @@ impl Light {
         let kernels = SlotKernels::of(method);
         let texel_count = u64::from(size[0]) * u64::from(size[1]);
         let most_slots = MOST_SLOTS.min(texel_count / 4).max(1);
+        // A small slot is a tile; of a large one, thin as it may be, a tile is 16 texels.
+        let most_tiles = most_slots + texel_count / 16;
         let own_layout = layout(
             gpu,
             ShaderStages::COMPUTE,
@@ -178,8 +181,9 @@ impl Light {
         let cells = gpu.scratch("cells", u64::from(CELL_COUNT) * CELL_BYTES)?;
         let parameters = gpu.uniform("light parameters", size_of::<LightParameters>());
         let slots = gpu.scratch("slots", most_slots * kernels.record_bytes)?;
-        let noise = gpu.scratch("noise", most_slots * 4)?;
-        let judgements = gpu.scratch("judgements of slots", most_slots * JUDGEMENT_BYTES)?;
+        let quality_bytes = most_slots * size_of::<Quality>() as u64;
+        let qualities = gpu.scratch("qualities", quality_bytes)?;
+        let judgements = gpu.scratch("judgements of tiles", most_tiles * JUDGEMENT_BYTES)?;
         let group = bind(
             gpu,
             &own_layout,
@@ -188,7 +192,7 @@ impl Light {
                 &slots,
                 &texels.diffuse,
                 &texels.glossy,
-                &noise,
+                &qualities,
                 &shown,
                 &texels.moments,
                 &cells,
@@ -233,10 +237,11 @@ impl Light {
             parameters,
             kernels,
             slots,
+            most_tiles,
             smoothings: 1,
             is_even: false,
-            noise_readback: gpu.readback("noise", most_slots * 4),
-            noise,
+            qualities_readback: gpu.readback("qualities", quality_bytes),
+            qualities,
             group,
         })
     }
@@ -376,16 +381,22 @@ impl Light {
     /// paths one after the other.
     pub fn trace(&self, gpu: &Gpu, gpu_scene: &GpuScene, jobs: &[Job], viewer: Viewer) {
         let mut records = Vec::new();
-        let mut path_count = 0;
+        let (mut path_count, mut tile_count) = (0, 0);
         let jobs = &jobs[..jobs.len().min(self.most_slots())];
+        let mut slot_count = 0;
         for job in jobs {
-            job.record(path_count, &mut records);
+            if u64::from(tile_count + job.tiles()) > self.most_tiles {
+                break;
+            }
+            job.record([path_count, tile_count], &mut records);
             path_count += job.paths();
+            tile_count += job.tiles();
+            slot_count += 1;
         }
-        self.set_slots(gpu, &records, jobs.len(), viewer);
+        self.set_slots(gpu, &records, [slot_count, tile_count], viewer);
         let ends = Ends {
             start: &self.start,
-            before_finish: Some((&self.change, jobs.len() as u32)),
+            before_finish: Some((&self.change, tile_count)),
             finish: &self.accumulate,
             group: &self.group,
             from_camera: false,
@@ -394,7 +405,7 @@ impl Light {
     }
 
     /// Makes what is shown of the slots of `lit`, which were traced, and of `unlit`,
-    /// and tells how noisy each of the former still is. No slot is in both.
+    /// and tells how well each of the former is known. No slot is in both.
     ///
     /// # Errors
     /// When the driver fails.
@@ -405,17 +416,17 @@ impl Light {
         lit: &[Job],
         unlit: &[Job],
         viewer: Viewer,
-    ) -> Result<Vec<f32>, GpuError> {
+    ) -> Result<Vec<Quality>, GpuError> {
         let count = (lit.len() + unlit.len()).min(self.most_slots());
         if count == 0 {
             return Ok(Vec::new());
         }
         let mut records = Vec::new();
         for job in lit.iter().chain(unlit).take(count) {
-            job.record(0, &mut records);
+            job.record([0; 2], &mut records);
         }
         let lit = lit.len().min(count);
-        self.set_slots(gpu, &records, count, viewer);
+        self.set_slots(gpu, &records, [count as u32, 0], viewer);
         let mut encoder = gpu
             .device
             .create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
@@ -438,9 +449,9 @@ impl Light {
             gpu.queue.submit([encoder.finish()]);
             return Ok(Vec::new());
         }
-        let bytes = lit as u64 * 4;
-        encoder.copy_buffer_to_buffer(&self.noise, 0, &self.noise_readback, 0, bytes);
-        gpu.submit_and_read(encoder, &self.noise_readback, bytes, |bytes| {
+        let bytes = lit as u64 * size_of::<Quality>() as u64;
+        encoder.copy_buffer_to_buffer(&self.qualities, 0, &self.qualities_readback, 0, bytes);
+        gpu.submit_and_read(encoder, &self.qualities_readback, bytes, |bytes| {
             bytemuck::cast_slice(bytes).to_vec()
         })
     }
@@ -449,12 +460,18 @@ impl Light {
         (self.slots.size() / self.kernels.record_bytes) as usize
     }
 
-    fn set_slots(&self, gpu: &Gpu, records: &[u32], count: usize, viewer: Viewer) {
+    fn set_slots(
+        &self,
+        gpu: &Gpu,
+        records: &[u32],
+        [slot_count, tile_count]: [u32; 2],
+        viewer: Viewer,
+    ) {
         let parameters = LightParameters {
             eye: viewer.eye.to_array(),
-            slot_count: count as u32,
+            slot_count,
             atlas_width: self.atlas_width,
-            seed: 0,
+            tile_count,
             pixel_angle: 1.0 / viewer.pixels_per_radian,
             exposure: viewer.exposure,
         };

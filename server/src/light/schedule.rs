@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 use shadecast_protocol::{PatchId, PatchShape, Slot};
-use shadecast_shaders::light::{BlockRecord, TriangleRecord};
+use shadecast_shaders::light::{BlockRecord, Quality, TILE_SIDE, TriangleRecord};
 
 use crate::patches::Patch;
 
@@ -18,6 +18,8 @@ const COARSEST: u32 = 3;
 const EXPECTED_NOISE: f32 = 0.7;
 /// Samples after which the measured noise is believed as much as the expectation.
 const BELIEF: f32 = 3.0;
+/// Relative change of light that is believed of one update, where nobody has looked.
+const DRIFT: f32 = 0.06;
 /// Samples that any content counts as at least.
 const LEAST_WORTH: f32 = 0.01;
 /// Turn of the eye, in half widths of the lobe, after which a reflection of the sun is
@@ -51,12 +53,24 @@ impl Job {
     /// none of a square is the slot's own, its path ends before it begins.
     #[must_use]
     pub fn paths(&self) -> u32 {
+        let [columns, rows] = self.across();
+        columns * rows
+    }
+
+    /// Tiles that they are judged in.
+    pub(super) fn tiles(&self) -> u32 {
+        let [columns, rows] = self.across().map(|paths| paths.div_ceil(TILE_SIDE));
+        columns * rows
+    }
+
+    /// Paths on either axis.
+    fn across(&self) -> [u32; 2] {
         let (bounds, side) = (self.slot.bounds(), 1 << self.log2_stride);
-        bounds.width.div_ceil(side) * bounds.height.div_ceil(side)
+        [bounds.width, bounds.height].map(|texels| texels.div_ceil(side))
     }
 
     /// Appends the slot's record, as words.
-    pub(super) fn record(&self, first_job: u32, records: &mut Vec<u32>) {
+    pub(super) fn record(&self, [first_job, first_tile]: [u32; 2], records: &mut Vec<u32>) {
         let common_bits = self.log2_stride << 10 | self.instance << 16;
         match self.slot {
             Slot::Block(block) => {
@@ -67,6 +81,7 @@ impl Job {
                 };
                 let record = BlockRecord {
                     first_job,
+                    first_tile,
                     position: u32::from(block.x) | u32::from(block.y) << 16,
                     layout_bits: super::level_bits(block)
                         | shape << 8
@@ -83,6 +98,7 @@ impl Job {
             Slot::Triangle(slot) => {
                 let record = TriangleRecord {
                     first_job,
+                    first_tile,
                     layout_bits: common_bits,
                     first_triangle: self.first_triangle,
                     sample_index: self.sample_index,
@@ -113,6 +129,8 @@ struct Lit {
     view: Vec3,
     /// From where it was seen when it was made to be shown last.
     shown_from: Vec3,
+    /// The update that lit it last.
+    update: u32,
 }
 
 /// How long what is known of a patch's light stays true.
@@ -151,6 +169,8 @@ pub struct Schedule {
     lit: Vec<Lit>,
     /// By patch.
     lasting: Vec<Lasting>,
+    /// Updates so far.
+    update: u32,
 }
 
 impl Schedule {
@@ -160,6 +180,7 @@ impl Schedule {
         Self {
             lit: vec![Lit::default(); lasting.len()],
             lasting,
+            update: 0,
         }
     }
 
@@ -218,10 +239,13 @@ impl Schedule {
             let expected = EXPECTED_NOISE * EXPECTED_NOISE / lit.worth;
             let believed =
                 (lit.noise * lit.noise * lit.worth + expected * BELIEF) / (lit.worth + BELIEF);
-            // Squared error that one more sample removes, per path.
-            let worth = self.worth(id, job.glossy_keep);
-            let gain = believed * lit.worth / (worth * (worth + 1.0)) * pixels.max(1) as f32
-                / slot.bounds().area() as f32;
+            // Squared error that one more sample removes, as a Kalman filter has it: that
+            // of a sample, and that of what is known, which grows while nobody looks.
+            let of_sample = believed * lit.worth;
+            let unseen = self.update.wrapping_sub(lit.update) as f32;
+            let known = of_sample / self.worth(id, job.glossy_keep) + DRIFT * DRIFT * unseen;
+            let removed = known * known / (known + of_sample).max(f32::MIN_POSITIVE);
+            let gain = removed * pixels.max(1) as f32 / slot.bounds().area() as f32;
             others.push((gain, job));
         }
         let cost = |stride: u32| -> u64 {
@@ -317,13 +341,22 @@ impl Schedule {
                 (lit.glossy_worth * job.glossy_keep).min(job.longest_history) + weight;
             lit.view = job.view;
             lit.shown_from = job.view;
+            lit.update = self.update;
         }
     }
 
-    /// Notes how noisy the slots of `jobs` were found to be.
-    pub fn measured(&mut self, jobs: &[Job], noise: &[f32]) {
-        for (job, &noise) in jobs.iter().zip(noise) {
-            self.lit[job.patch.0 as usize].noise = if noise.is_finite() { noise } else { 0.0 };
+    /// Ends an update: notes what was found of the slots of `jobs`.
+    pub fn measured(&mut self, jobs: &[Job], found: &[Quality]) {
+        self.update = self.update.wrapping_add(1);
+        for (job, found) in jobs.iter().zip(found) {
+            let lit = &mut self.lit[job.patch.0 as usize];
+            lit.noise = if found.noise.is_finite() {
+                found.noise
+            } else {
+                0.0
+            };
+            // Where light has changed, texels have let go of their samples.
+            lit.worth = lit.worth.min(found.samples.max(LEAST_WORTH));
         }
     }
 }
@@ -339,6 +372,14 @@ mod tests {
         alpha: 1.0,
         shine: 0.0,
     };
+
+    /// As noisy, with all samples that were drawn.
+    fn noisy(noise: f32) -> Quality {
+        Quality {
+            noise,
+            samples: f32::INFINITY,
+        }
+    }
 
     fn patches(count: u32) -> Vec<Patch> {
         (0..count)
@@ -387,11 +428,48 @@ mod tests {
         let first = schedule.choose(&patches(3), placed(3), u32::MAX, &[Vec3::ZERO]);
         for _ in 0..20 {
             schedule.traced(&first);
-            schedule.measured(&first, &[0.01, 0.5, 0.01]);
+            schedule.measured(&first, &[0.01, 0.5, 0.01].map(noisy));
         }
         let next = schedule.choose(&patches(3), placed(3), 64, &[Vec3::ZERO]);
         assert_eq!(next.len(), 1);
         assert_eq!(next[0].patch, PatchId(1));
+    }
+
+    #[test]
+    fn what_nobody_looked_at_gets_its_turn() {
+        let mut schedule = Schedule::new(vec![MATTE; 2]);
+        let first = schedule.choose(&patches(2), placed(2), u32::MAX, &[Vec3::ZERO]);
+        for _ in 0..20 {
+            schedule.traced(&first);
+            schedule.measured(&first, &[0.3, 0.0].map(noisy));
+        }
+        let mut turn = || {
+            let jobs = schedule.choose(&patches(2), placed(2), 64, &[Vec3::ZERO]);
+            schedule.traced(&jobs);
+            schedule.measured(&jobs, &[noisy(0.3)]);
+            jobs[0].patch()
+        };
+        // The second one is free of noise, as far as is known.
+        let turns: Vec<PatchId> = (0..60).map(|_| turn()).collect();
+        assert_eq!(turns[0], PatchId(0));
+        assert!(turns.contains(&PatchId(1)));
+    }
+
+    #[test]
+    fn paths_go_where_light_has_changed() {
+        let mut schedule = Schedule::new(vec![MATTE; 2]);
+        let first = schedule.choose(&patches(2), placed(2), u32::MAX, &[Vec3::ZERO]);
+        for _ in 0..20 {
+            schedule.traced(&first);
+            schedule.measured(&first, &[0.1; 2].map(noisy));
+        }
+        let changed = Quality {
+            noise: 0.1,
+            samples: 1.5,
+        };
+        schedule.measured(&first, &[noisy(0.1), changed]);
+        let next = schedule.choose(&patches(2), placed(2), 64, &[Vec3::ZERO]);
+        assert_eq!(next[0].patch(), PatchId(1));
     }
 
     #[test]
@@ -406,7 +484,7 @@ mod tests {
         for _ in 0..20 {
             let jobs = schedule.choose(&patches(2), placed(2), u32::MAX, &before);
             schedule.traced(&jobs);
-            schedule.measured(&jobs, &[0.1; 2]);
+            schedule.measured(&jobs, &[0.1; 2].map(noisy));
         }
         let stale = |schedule: &Schedule, eyes| schedule.stale(&patches(2), placed(2), eyes);
         assert!(stale(&schedule, &before).is_empty());
@@ -444,7 +522,7 @@ mod tests {
         let mut schedule = Schedule::new(vec![MATTE; 2]);
         let first = schedule.choose(&patches(2), placed(2), u32::MAX, &[Vec3::ZERO]);
         schedule.traced(&first);
-        schedule.measured(&first, &[f32::NAN, 0.1]);
+        schedule.measured(&first, &[f32::NAN, 0.1].map(noisy));
         schedule.placed(PatchId(1), false, false);
         let next = schedule.choose(&patches(2), placed(2), 0, &[Vec3::ZERO]);
         assert_eq!(

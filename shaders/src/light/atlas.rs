@@ -3,6 +3,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
+/// Jobs on a side of a tile, whose paths are judged together.
+pub const TILE_SIDE: u32 = 8;
+
 /// What is the same for all jobs of a dispatch.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
@@ -13,8 +16,8 @@ pub struct LightParameters {
     pub slot_count: u32,
     /// In texels.
     pub atlas_width: u32,
-    /// Of the sampler.
-    pub seed: u32,
+    /// Tiles that are lit: see [`TILE_SIDE`].
+    pub tile_count: u32,
     /// Width that a pixel's sample has a metre away.
     pub pixel_angle: f32,
     /// Factor from radiance to displayed brightness.
@@ -27,6 +30,8 @@ pub struct LightParameters {
 pub struct BlockRecord {
     /// Its first job; ascending over the list.
     pub first_job: u32,
+    /// Its first tile of jobs; likewise.
+    pub first_tile: u32,
     /// x, and y in the upper half.
     pub position: u32,
     /// Of the block: log2 width, log2 height << 4, shape << 8, log2 stride << 10,
@@ -42,6 +47,16 @@ pub struct BlockRecord {
     pub longest_history: f32,
     /// What old glossy samples are still worth, seen from where the eye is now.
     pub glossy_keep: f32,
+}
+
+/// How well a slot is known.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Quality {
+    /// Mean over the slot of the standard error relative to the tone curve's scale.
+    pub noise: f32,
+    /// Samples of a texel's diffuse light: their harmonic mean.
+    pub samples: f32,
 }
 
 /// A point of a patch by one of its triangles.

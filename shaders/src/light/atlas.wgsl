@@ -16,7 +16,7 @@ struct LightParameters {
     eye: vec3<f32>,
     slot_count: u32,
     atlas_width: u32,
-    seed: u32,
+    tile_count: u32,
     // Width of a pixel a metre away.
     pixel_angle: f32,
     // Factor from radiance to displayed brightness.
@@ -29,6 +29,10 @@ struct LightParameters {
 @group(2) @binding(3) var<storage, read_write> glossy: array<vec4<f32>>;
 @group(2) @binding(6) var<storage, read_write> moments: array<vec4<f32>>;
 
+// Jobs on a side of a tile: what was found is judged tile by tile, so that a shadow
+// that falls on a small part of a large slot is noticed there.
+const TILE_SIDE: u32 = 8u;
+
 // Samples over which means run where a moving object was met.
 const MOVING_HISTORY: f32 = 8.0;
 
@@ -38,6 +42,8 @@ const BRIGHTEST_PATH: f32 = 1e18;
 
 // Brightness of a path, in that usual about it, which one sample may have.
 const OUTSHINING: f32 = 8.0;
+// The same of what a tile's paths are short of: a whole tile would show it as a spot.
+const OUTSHINING_TOGETHER: f32 = 0.3;
 // Displayed brightness that is usual everywhere.
 const FAINT: f32 = 0.05;
 
@@ -51,8 +57,8 @@ struct PatchPoint {
 
 struct Job {
     slot: SlotRecord,
-    // Of the slot.
-    index: u32,
+    // Among those of all slots.
+    tile: u32,
     laid: Laid,
     // First of the texels that the path lights, in the slot's bounds.
     corner: vec2<u32>,
@@ -73,19 +79,19 @@ fn job_at(index: u32) -> Job {
             high = middle - 1u;
         }
     }
-    return job_of(low, index);
+    let slot = slots[low];
+    let local = index - slot.first_job;
+    let columns = jobs_across(slot).x;
+    return job_of(slot, vec2<u32>(local % columns, local / columns));
 }
 
-fn job_of(slot: u32, index: u32) -> Job {
+fn job_of(slot: SlotRecord, place: vec2<u32>) -> Job {
     var job: Job;
-    job.slot = slots[slot];
-    job.index = slot;
-    let log_stride = log2_stride_of(job.slot);
-    job.laid = laid(job.slot);
-    job.stride = 1u << log_stride;
-    let columns = columns_of(job.laid, log_stride);
-    let local = index - job.slot.first_job;
-    job.corner = vec2<u32>(local % columns, local / columns) * job.stride;
+    job.slot = slot;
+    job.tile = slot.first_tile + place.x / TILE_SIDE + place.y / TILE_SIDE * tiles_across(slot).x;
+    job.laid = laid(slot);
+    job.stride = 1u << log2_stride_of(slot);
+    job.corner = place * job.stride;
     job.first = job.corner;
     if (HAS_GAPS) {
         let owned = first_owned(job.laid, job.corner, job.stride);
@@ -95,9 +101,14 @@ fn job_of(slot: u32, index: u32) -> Job {
     return job;
 }
 
-// Paths side by side.
-fn columns_of(at: Laid, log2_stride: u32) -> u32 {
-    return (at.size.x + (1u << log2_stride) - 1u) >> log2_stride;
+// Paths side by side, on either axis.
+fn jobs_across(slot: SlotRecord) -> vec2<u32> {
+    let stride = 1u << log2_stride_of(slot);
+    return (laid(slot).size + stride - 1u) / stride;
+}
+
+fn tiles_across(slot: SlotRecord) -> vec2<u32> {
+    return (jobs_across(slot) + TILE_SIDE - 1u) / TILE_SIDE;
 }
 
 // The first of a square of texels that is the slot's own, and whether there is any.
@@ -162,7 +173,7 @@ fn start_at_texels(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_wo
         }
         return;
     }
-    let seed = hash(hash(job.slot.patch_id * 0x9e3779b9u + parameters.seed) ^ (job.corner.x << 16u | job.corner.y));
+    let seed = hash(hash(job.slot.patch_id * 0x9e3779b9u) ^ (job.corner.x << 16u | job.corner.y));
     var rng = Sampler(job.slot.sample_index, seed, 0u);
     // Jitter inside the texel.
     let middle = vec2<f32>(job.corner) + 0.5 * f32(job.stride - 1u);
@@ -200,22 +211,23 @@ fn histories_at(at: u32, slot: SlotRecord, path: PathState, judgement: Judgement
     return min(vec2<f32>(diffuse[at].w, glossy[at].w * slot.glossy_keep), vec2<f32>(longest)) * judgement.kept;
 }
 
-// Of a path's light, what a mean of `samples` takes: no more than `OUTSHINING` times
+// Of a path's light, what a mean of `samples` takes: no more than `outshining` times
 // what is usual there for each of its samples. A rare path that carries much light
 // comes in slowly, as others like it come, and not as a spot that stays; as samples
 // grow the limit does.
 // Related: Zirr et al., "Re-weighting Firefly Samples for Improved Finite-Sample
 // Monte Carlo Estimates", 2018.
-fn limited(light: vec3<f32>, usual: f32, samples: f32) -> vec3<f32> {
-    let most = OUTSHINING * (samples + 1.0) * max(usual, FAINT / max(parameters.exposure, 1e-30));
+fn limited(light: vec3<f32>, outshining: f32, usual: f32, samples: f32) -> vec3<f32> {
+    let most = outshining * (samples + 1.0) * max(usual, FAINT / max(parameters.exposure, 1e-30));
     return light * select(1.0, min(most / max(luminance(light), 1e-30), 1.0), SMOOTHING);
 }
 
-// What a texel takes of what a path found. The slot's texels share the excess: it is
-// spread out, not lost.
-fn accepted_at(at: u32, found: Found, histories: vec2<f32>, judgement: Judgement) -> Found {
+// What a texel takes of what a path found. The tile's texels share the excess, as far
+// as that is not seen as a spot in its turn.
+fn accepted_at(at: u32, found: Found, outshining: f32, histories: vec2<f32>, judgement: Judgement) -> Found {
     let usual = max(judgement.usual, vec2<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb)));
-    return Found(limited(found.diffuse, usual.x, histories.x), limited(found.glossy, usual.y, histories.y), found.sun);
+    return Found(limited(found.diffuse, outshining, usual.x, histories.x),
+        limited(found.glossy, outshining, usual.y, histories.y), found.sun);
 }
 
 @compute @workgroup_size(64)
@@ -232,9 +244,9 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
     // A coarse look is one sample, shared by the texels that it lights.
     let weight_of_sample = 1.0 / f32(job.stride * job.stride);
     let found = found_by(state);
-    let judgement = judgements[job.index];
+    let judgement = judgements[job.tile];
     let shared_out = Found(judgement.diffuse_excess, judgement.glossy_excess, 0.0);
-    add_to_cell(state.cell, limited(found.diffuse, judgement.usual.x, judgement.around));
+    add_to_cell(state.cell, limited(found.diffuse, OUTSHINING, judgement.usual.x, judgement.around));
     for (var y = 0u; y < min(job.stride, job.laid.size.y - job.corner.y); y++) {
         for (var x = 0u; x < min(job.stride, job.laid.size.x - job.corner.x); x++) {
             let texel = job.corner + vec2<u32>(x, y);
@@ -243,8 +255,8 @@ fn accumulate(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgro
             }
             let at = index_of_texel(job.laid, texel);
             let histories = histories_at(at, job.slot, state, judgement);
-            let own = accepted_at(at, found, histories, judgement);
-            let others = accepted_at(at, shared_out, histories, judgement);
+            let own = accepted_at(at, found, OUTSHINING, histories, judgement);
+            let others = accepted_at(at, shared_out, OUTSHINING_TOGETHER, histories, judgement);
             let light = own.diffuse + others.diffuse;
             let glossy_light = own.glossy + others.glossy;
             let shares = weight_of_sample / (histories + weight_of_sample);

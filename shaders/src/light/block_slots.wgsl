@@ -4,6 +4,7 @@
 
 struct BlockRecord {
     first_job: u32,
+    first_tile: u32,
     // x | y << 16
     position: u32,
     // log2 width | log2 height << 4 | shape << 8 | log2 stride << 10 | turned << 14 | instance << 16

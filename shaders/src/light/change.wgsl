@@ -1,20 +1,20 @@
-// How much of what a slot remembers still holds: all of it, unless its new paths
-// together found other light by more than noise explains. One texel cannot tell; a
-// slot can, and so a light that moves, dims or is hidden is followed at once while
-// what stands still keeps its history.
-// One workgroup per slot; reads what its paths of this wave found and what its
-// texels remember, writes `judgements`. Runs before `accumulate`.
+// How much of what a tile of a slot remembers still holds: all of it, unless its new
+// paths together found other light by more than noise explains. One texel cannot tell;
+// a tile can, and so a light that moves, dims or is hidden is followed at once, where
+// its shadow falls, while what stands still keeps its history.
+// One workgroup per tile, a thread per path; reads what the paths of this wave found
+// and what texels remember, writes `judgements`. Runs before `accumulate`.
 // Related: Schied et al., "Gradient Estimation for Real-Time Adaptive Temporal
 // Filtering", 2018, which traces paths again to the same end.
 
 struct Judgement {
-    // How much of the slot's diffuse and of its glossy history holds.
+    // How much of the tile's diffuse and of its glossy history holds.
     kept: vec2<f32>,
     // Luminance that a diffuse and a glossy path usually bring here.
     usual: vec2<f32>,
     // What one path is short of by `limited`, on average over the wave's paths.
     diffuse_excess: vec3<f32>,
-    // Paths that the cells about the slot have heard of, on average.
+    // Paths that the cells about the tile have heard of, on average.
     around: f32,
     glossy_excess: vec3<f32>,
     padding: u32,
@@ -26,8 +26,11 @@ struct Judgement {
 const OPINION: f32 = 2.0;
 // Relative difference that is no change, whatever its variance.
 const NO_CHANGE: f32 = 0.03;
-// Square of the difference, in variances, from which on light has changed.
-const CHANGED: f32 = 9.0;
+// Square of the difference, in variances, from which on light has changed, where this
+// many samples or fewer are remembered. Of more samples as many more would be lost by
+// chance: the bound grows as a normal distribution's tail asks for it.
+const CHANGED: f32 = 3.0;
+const FEW_SAMPLES: f32 = 8.0;
 // Least of a history that is kept.
 const LEAST_KEPT: f32 = 0.02;
 
@@ -44,6 +47,8 @@ struct Change {
     found: vec2<f32>,
     brightest: vec2<f32>,
     paths: f32,
+    // What is remembered is worth.
+    samples: vec2<f32>,
     // Light of the cells that the paths add to, and its paths.
     around: vec2<f32>,
 }
@@ -60,41 +65,25 @@ var<workgroup> judged: Judgement;
 @compute @workgroup_size(64)
 fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>,
     @builtin(local_invocation_index) lane: u32) {
-    let index = group.x + group.y * groups.x;
-    if (index >= parameters.slot_count) {
+    let tile = group.x + group.y * groups.x;
+    if (tile >= parameters.tile_count) {
         return;
     }
-    let slot = slots[index];
-    var end = wave.first_job + wave.path_count;
-    if (index + 1u < parameters.slot_count) {
-        end = min(end, slots[index + 1u].first_job);
-    }
-    let first = max(slot.first_job, wave.first_job) + lane;
+    let slot = slot_of_tile(tile);
+    let across = jobs_across(slot);
+    let columns = tiles_across(slot).x;
+    let corner = vec2<u32>((tile - slot.first_tile) % columns, (tile - slot.first_tile) / columns) * TILE_SIDE;
+    let place = corner + vec2<u32>(lane % TILE_SIDE, lane / TILE_SIDE);
+    let job = job_of(slot, place);
+    // Of the wave; of another one it wraps around, and is too large.
+    let index = slot.first_job + place.y * across.x + place.x - wave.first_job;
+    let is_traced = all(place < across) && index < wave.path_count && job.stride != 0u;
     var change: Change;
-    for (var i = first; i < end; i += 64u) {
-        let job = job_of(index, i);
-        if (HAS_GAPS && job.stride == 0u) {
-            continue;
-        }
-        let at = index_of_texel(job.laid, job.first);
-        let path = paths[i - wave.first_job];
-        let found = found_by(path);
-        let samples = vec3<f32>(diffuse[at].w, glossy[at].w * slot.glossy_keep, diffuse[at].w);
-        let remembered = vec3<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb), moments[at].x);
-        let squares = vec3<f32>(moments[at].yz, moments[at].x);
-        let spread = max(squares - remembered * remembered, vec3<f32>(0.0));
-        let has_opinion = select(vec3<f32>(0.0), vec3<f32>(1.0), samples >= vec3<f32>(OPINION));
-        let brightness = vec2<f32>(luminance(found.diffuse), luminance(found.glossy));
-        change.found += brightness;
-        change.brightest = max(change.brightest, brightness);
-        change.paths += 1.0;
-        let around = cell_light(path.cell);
-        change.around += vec2<f32>(luminance(around.rgb), around.w);
-        let difference = vec3<f32>(brightness, found.sun) - remembered;
-        change.difference += difference * has_opinion;
-        change.largest = max(change.largest, difference * has_opinion);
-        change.variance += spread * (1.0 + 1.0 / max(samples, vec3<f32>(1.0))) * has_opinion;
-        change.remembered += remembered * has_opinion;
+    var found: Found;
+    let at = index_of_texel(job.laid, job.first);
+    if (is_traced) {
+        found = found_by(paths[index]);
+        change = change_by(at, slot, found, cell_light(paths[index].cell));
     }
     changes[lane] = change;
     workgroupBarrier();
@@ -107,24 +96,18 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             change.found += changes[i].found;
             change.brightest = max(change.brightest, changes[i].brightest);
             change.paths += changes[i].paths;
+            change.samples += changes[i].samples;
             change.around += changes[i].around;
         }
         judged = judgement_of(change);
     }
     workgroupBarrier();
-    let judgement = judged;
     var excess: Excess;
-    for (var i = first; SMOOTHING && i < end; i += 64u) {
-        let job = job_of(index, i);
-        if (HAS_GAPS && job.stride == 0u) {
-            continue;
-        }
-        let at = index_of_texel(job.laid, job.first);
-        let path = paths[i - wave.first_job];
-        let found = found_by(path);
-        let accepted = accepted_at(at, found, histories_at(at, slot, path, judgement), judgement);
-        excess.diffuse += found.diffuse - accepted.diffuse;
-        excess.glossy += found.glossy - accepted.glossy;
+    if (SMOOTHING && is_traced) {
+        let judgement = judged;
+        let histories = histories_at(at, slot, paths[index], judgement);
+        let accepted = accepted_at(at, found, OUTSHINING, histories, judgement);
+        excess = Excess(found.diffuse - accepted.diffuse, found.glossy - accepted.glossy);
     }
     excesses[lane] = excess;
     workgroupBarrier();
@@ -135,8 +118,44 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         }
         judged.diffuse_excess = excess.diffuse / max(change.paths, 1.0);
         judged.glossy_excess = excess.glossy / max(change.paths, 1.0);
-        judgements[index] = judged;
+        judgements[tile] = judged;
     }
+}
+
+fn slot_of_tile(tile: u32) -> SlotRecord {
+    var low = 0u;
+    var high = parameters.slot_count - 1u;
+    while (low < high) {
+        let middle = (low + high + 1u) / 2u;
+        if (slots[middle].first_tile <= tile) {
+            low = middle;
+        } else {
+            high = middle - 1u;
+        }
+    }
+    return slots[low];
+}
+
+// What one path says, whose first texel is `at`.
+fn change_by(at: u32, slot: SlotRecord, found: Found, around: vec4<f32>) -> Change {
+    let samples = vec3<f32>(diffuse[at].w, glossy[at].w * slot.glossy_keep, diffuse[at].w);
+    let remembered = vec3<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb), moments[at].x);
+    let squares = vec3<f32>(moments[at].yz, moments[at].x);
+    let spread = max(squares - remembered * remembered, vec3<f32>(0.0));
+    let has_opinion = select(vec3<f32>(0.0), vec3<f32>(1.0), samples >= vec3<f32>(OPINION));
+    let brightness = vec2<f32>(luminance(found.diffuse), luminance(found.glossy));
+    let difference = vec3<f32>(brightness, found.sun) - remembered;
+    var change: Change;
+    change.found = brightness;
+    change.brightest = brightness;
+    change.paths = 1.0;
+    change.samples = samples.xy;
+    change.around = vec2<f32>(luminance(around.rgb), around.w);
+    change.difference = difference * has_opinion;
+    change.largest = max(change.difference, vec3<f32>(0.0));
+    change.variance = spread * (1.0 + 1.0 / max(samples, vec3<f32>(1.0))) * has_opinion;
+    change.remembered = remembered * has_opinion;
+    return change;
 }
 
 fn judgement_of(of_all: Change) -> Judgement {
@@ -144,7 +163,9 @@ fn judgement_of(of_all: Change) -> Judgement {
     let least = NO_CHANGE * max(of_all.remembered, abs(difference));
     // Ratios of roots: squares of the brightest light leave the range of f32.
     let surprise = abs(difference) / max(sqrt(of_all.variance) + least, vec3<f32>(1e-18));
-    let keep = clamp(CHANGED / max(surprise * surprise, vec3<f32>(1e-6)), vec3<f32>(LEAST_KEPT), vec3<f32>(1.0));
+    let mean_samples = (of_all.samples / max(of_all.paths, 1.0)).xyx;
+    let changed = CHANGED + 2.0 * log(max(mean_samples / FEW_SAMPLES, vec3<f32>(1.0)));
+    let keep = clamp(changed / max(surprise * surprise, vec3<f32>(1e-6)), vec3<f32>(LEAST_KEPT), vec3<f32>(1.0));
     var judgement: Judgement;
     judgement.kept = vec2<f32>(min(keep.x, keep.z), keep.y);
     // Without the brightest path: it is the one in question.

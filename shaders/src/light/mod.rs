@@ -9,7 +9,9 @@ mod scene;
 mod still;
 mod triangle;
 
-pub use atlas::{BlockRecord, LightParameters, PatchPoint, patch_point, texel_coordinates};
+pub use atlas::{
+    BlockRecord, LightParameters, PatchPoint, Quality, TILE_SIDE, patch_point, texel_coordinates,
+};
 pub use carry::{CarryParameters, Move, NO_BLOCK, TriangleMove, how};
 pub use environment::EnvironmentCell;
 pub use path::{HIT_BYTES, RAY_BYTES, STATE_BYTES, Wave};

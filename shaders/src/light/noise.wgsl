@@ -1,12 +1,20 @@
 // How noisy each slot just lit still is, as it is seen.
 // One thread per slot; reads what its texels remember and what is shown of them,
-// writes `noise`: the mean over the slot of the standard error relative to the
-// tone curve's scale.
+// writes `qualities`.
 
-@group(2) @binding(4) var<storage, read_write> noise: array<f32>;
+struct Quality {
+    // Mean over the slot of the standard error relative to the tone curve's scale.
+    noise: f32,
+    // Samples of a texel's diffuse light: their harmonic mean.
+    samples: f32,
+}
+
+@group(2) @binding(4) var<storage, read_write> qualities: array<Quality>;
 
 // Texels looked at per slot and axis.
 const NOISE_SIDE: u32 = 8u;
+// Samples that a texel counts as at least.
+const LEAST_SAMPLES: f32 = 0.01;
 
 @compute @workgroup_size(64)
 fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
@@ -17,6 +25,7 @@ fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
     let size = here.size;
     let step = max(size / NOISE_SIDE, vec2<u32>(1u));
     var sum = 0.0;
+    var of_samples = 0.0;
     var count = 0.0;
     for (var y = 0u; y < size.y; y += step.y) {
         for (var x = 0u; x < size.x; x += step.x) {
@@ -31,8 +40,9 @@ fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
             let seen = luminance(shown[at].rgb);
             let color = min(seen / max(mean.x + mean.y, 1e-6), 1.0);
             sum += parameters.exposure * (error.x * color + error.y) / (parameters.exposure * seen + 0.2);
+            of_samples += 1.0 / max(diffuse[at].w, LEAST_SAMPLES);
             count += 1.0;
         }
     }
-    noise[id.x] = sum / max(count, 1.0);
+    qualities[id.x] = Quality(sum / max(count, 1.0), count / max(of_samples, 1e-6));
 }

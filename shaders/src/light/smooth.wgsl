@@ -1,9 +1,9 @@
 // Makes what is shown of slots that were lit or moved: smooths what few samples
 // have lit, and puts it on the surface.
 //
-// Diffuse and glossy light are each the mean over a small window of the slot,
-// each neighbour counting by its samples and by how likely the difference is
-// noise; diffuse light besides over the surroundings in the world, which reach
+// Diffuse light, glossy light and the share of the sun that is seen are each the mean
+// over a small window of the slot, each neighbour counting by its samples and by how
+// likely the difference is noise; diffuse light besides over the surroundings in the world, which reach
 // across the borders of patches. All fades out as the texel's own error falls, so
 // that a still scene converges to what was traced. Colour, normal, emission and the
 // sun's reflection are those of the texel's middle: they are free of noise.
@@ -34,6 +34,8 @@ const LEAST_GLOSSY_NOISE: f32 = 0.5;
 // Samples of a texel by which the surroundings count half as much: they know less
 // and less that it does not know itself, and are wider than its window.
 const SURROUNDED_SAMPLES: f32 = 4.5;
+// The same for the share of the sun, whose shadows have edges.
+const SHARE_TOLERANCE: f32 = 0.7;
 
 // Turn of the normal, in GGX alphas, that one look at the sun's reflection covers,
 // and looks along a texel's side at most.
@@ -53,6 +55,13 @@ fn own_share(variance: f32, samples: f32, least_noise: f32, smoothed: f32) -> f3
     let believed = SMOOTHING_ERROR * SMOOTHING_ERROR * smoothed * smoothed;
     let least = least_noise * least_noise * smoothed * smoothed / max(samples, 0.02);
     return believed / max(believed + max(variance, least), 1e-20);
+}
+
+// Variance of a share that so many samples have found. Samples that all found the same
+// do not make it certain: it is that after one more of either kind (Laplace's rule).
+fn variance_of_share(share: f32, samples: f32) -> f32 {
+    let believed = (share * samples + 1.0) / (samples + 2.0);
+    return believed * (1.0 - believed) / max(samples, 0.02);
 }
 
 // How much a neighbour counts whose mean differs by `difference`, for a texel of
@@ -140,6 +149,7 @@ fn smooth_slots(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
         let shiny = glossy[at];
         var diffuse_light = here.rgb;
         var glossy_light = shiny.rgb;
+        var sun_share = moments[at].x;
         if (SMOOTHING) {
             let mean = vec2<f32>(luminance(here.rgb), luminance(shiny.rgb));
             let variance = vec2<f32>(variance_of(mean.x, moments[at].y, here.w),
@@ -147,6 +157,9 @@ fn smooth_slots(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             var sum = vec3<f32>(0.0);
             var sum_glossy = vec3<f32>(0.0);
             var weights = vec2<f32>(0.0);
+            let share_variance = variance_of_share(sun_share, here.w);
+            var sum_share = 0.0;
+            var weight_of_shares = 0.0;
             let low = max(p - RADIUS, vec2<i32>(0));
             let high = min(p + RADIUS, size - 1);
             for (var y = low.y; y <= high.y; y++) {
@@ -166,6 +179,13 @@ fn smooth_slots(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                     sum += other.rgb * weight.x;
                     sum_glossy += other_glossy.rgb * weight.y;
                     weights += weight;
+                    if (HAS_SUN) {
+                        let variance = share_variance + variance_of_share(moments[near].x, other.w);
+                        let difference = (moments[near].x - moments[at].x) / SHARE_TOLERANCE;
+                        let weight = other.w * exp(-difference * difference / variance);
+                        sum_share += moments[near].x * weight;
+                        weight_of_shares += weight;
+                    }
                 }
             }
             let window = luminance(sum) / max(weights.x, 1e-6);
@@ -175,11 +195,13 @@ fn smooth_slots(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
             let smoothed = (sum + around.rgb * trust) / max(weights.x + trust, 1e-6);
             let smoothed_glossy = sum_glossy / max(weights.y, 1e-6);
             diffuse_light = mix(smoothed, here.rgb, own_share(variance.x, here.w, LEAST_NOISE, luminance(smoothed)));
+            let believed = SMOOTHING_ERROR * SMOOTHING_ERROR;
+            sun_share = mix(sum_share / max(weight_of_shares, 1e-6), sun_share, believed / (believed + share_variance));
             glossy_light = mix(smoothed_glossy, shiny.rgb, own_share(variance.y, shiny.w, LEAST_GLOSSY_NOISE, luminance(smoothed_glossy)));
         }
         var light = s.emissive + diffuse_color(s) * diffuse_light + glossy_light;
         if (HAS_SUN) {
-            light += moments[at].x * sunlight(slot, laid_here, seen, vec2<f32>(p));
+            light += sun_share * sunlight(slot, laid_here, seen, vec2<f32>(p));
         }
         shown[at] = vec4<f32>(sound(light), here.w);
     }

@@ -14,6 +14,8 @@ const UNITS: i32 = 8;
 pub struct TriangleRecord {
     /// Its first job; ascending over the list.
     pub first_job: u32,
+    /// Its first tile of jobs; likewise.
+    pub first_tile: u32,
     /// log2 stride << 10, instance << 16.
     pub layout_bits: u32,
     /// Of the patch, in scene order.

@@ -3,6 +3,7 @@
 
 struct TriangleRecord {
     first_job: u32,
+    first_tile: u32,
     // log2 stride << 10 | instance << 16
     layout_bits: u32,
     first_triangle: u32,
