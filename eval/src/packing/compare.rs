@@ -39,9 +39,9 @@ const WINDOW: u32 = 160;
 /// Frames of the walk.
 const FRAMES: u32 = 60;
 const QUICK_FRAMES: u32 = 8;
-/// Of these, those whose pictures are compared: one of so many.
-const COMPARED: u32 = 10;
-const QUICK_COMPARED: u32 = 4;
+/// Of these, those whose pictures are compared.
+const COMPARED: u32 = 6;
+const QUICK_COMPARED: u32 = 2;
 /// Within this field windows lie, across and up, radians.
 const WIDEST_LOOK: [f32; 2] = [1.2, 0.6];
 /// Quantisation parameter of the video: that of good television.
@@ -128,14 +128,16 @@ pub(super) fn measure(
     name: &str,
     scene: &Scene,
     sizes: &[[u16; 2]],
-    quick: bool,
+    (quick, frames): (bool, Option<u32>),
     progress: &Progress,
 ) -> Result<Compared> {
-    let (frames, step) = if quick {
+    let (usual, compared) = if quick {
         (QUICK_FRAMES, QUICK_COMPARED)
     } else {
         (FRAMES, COMPARED)
     };
+    let frames = frames.unwrap_or(usual);
+    let step = (frames / compared).max(1);
     let mut found = Compared {
         rows: Vec::new(),
         stages: Vec::new(),

@@ -19,7 +19,7 @@ mod strategy;
 mod tests;
 mod trace;
 
-use std::path::PathBuf;
+use std::{fmt::Write as _, path::PathBuf};
 
 use anyhow::Result;
 use clap::Args;
@@ -51,8 +51,9 @@ const SIZES: [[u16; 2]; 3] = [[1024, 1024], [2048, 2048], [4096, 2048]];
 /// Measures how fast and how well the atlas is managed.
 #[derive(Args, Debug)]
 pub struct Options {
-    /// Scenes that packers are compared in: `courtyard`, `lamps`, `plates`, or glTF
-    /// files [default: the built-in one of 15,000, 250,000 and 1,000,000 triangles].
+    /// Scenes that packers are compared in, and nothing else is measured: `courtyard`,
+    /// `lamps`, `plates`, or glTF files [default: the built-in one of 15,000, 250,000
+    /// and 1,000,000 triangles, quick: of 15,000; then the allocator by itself].
     #[arg(value_name = "SCENE")]
     pub scenes: Vec<String>,
     /// Folder for figures.
@@ -61,6 +62,9 @@ pub struct Options {
     /// Fewer frames of smaller scenes.
     #[arg(long)]
     pub quick: bool,
+    /// Frames of the walk that packers are compared along [default: 60, quick: 8].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub frames: Option<u32>,
 }
 
 /// Runs the measurement; the result is the page's tables.
@@ -68,10 +72,10 @@ pub struct Options {
 /// # Errors
 /// When a folder cannot be used, the GPU fails, or GPU and twin differ.
 pub fn run(options: &Options) -> Result<String> {
-    let walks = if options.quick {
-        &WALKS[..QUICK_WALKS]
-    } else {
-        &WALKS[..]
+    let walks = match options {
+        Options { scenes, .. } if !scenes.is_empty() => &[],
+        Options { quick: true, .. } => &WALKS[..QUICK_WALKS],
+        _ => &WALKS[..],
     };
     let gpu = Gpu::open()?;
     let subjects = subjects(options)?;
@@ -81,14 +85,14 @@ pub fn run(options: &Options) -> Result<String> {
         &SIZES[..]
     };
     let runs = subjects.len() * sizes.len() * Method::ALL.len();
-    let progress = Progress::new((runs + walks.len() + 1) as u64);
+    let progress = Progress::new((runs + walks.len() + usize::from(!walks.is_empty())) as u64);
     let mut compared = Vec::new();
     for (name, scene) in &subjects {
         compared.push(compare::measure(
             name,
             scene,
             sizes,
-            options.quick,
+            (options.quick, options.frames),
             &progress,
         )?);
     }
@@ -101,31 +105,33 @@ pub fn run(options: &Options) -> Result<String> {
         speeds.extend(measured.rows);
         kernels.extend(measured.kernels);
     }
-    progress.step("strategies");
-    let strategies =
-        strategy::measure(&walked(strategy::TRIANGLES, true), options.quick, &progress);
-    progress.finish();
     let folder = |name| {
         let walks = (walks.iter()).map(|(triangles, _)| courtyard_of(*triangles));
         let scenes = (subjects.iter()).map(|(name, _)| name.clone());
         let header = Header::new(name, &gpu.adapter, scenes.chain(walks).collect(), 0);
         Folder::new(&options.out, header)
     };
-    let of_packers = page::write(&folder("packing")?, &compared)?;
+    let mut body = page::write(&folder("packing")?, &compared)?;
     let stages: Vec<stage::Row> = (compared.iter())
         .flat_map(|found| found.stages.iter().cloned())
         .collect();
     folder("packing-stage")?.csv(&stages)?;
-    folder("packing-speed")?.csv(&speeds)?;
-    folder("packing-kernels")?.csv(&kernels)?;
-    folder("packing-strategies")?.csv(&strategies)?;
-    let body = format!(
-        "{of_packers}\n{}\n{}\n{}\n{}",
-        stage::table_of(&stages),
-        speed::table_of(&speeds),
-        speed::table_of_kernels(&kernels),
-        strategy::table_of(&strategies),
-    );
+    write!(body, "\n{}", stage::table_of(&stages))?;
+    if !walks.is_empty() {
+        progress.step("strategies");
+        let scene = walked(strategy::TRIANGLES, true);
+        let strategies = strategy::measure(&scene, options.quick, &progress);
+        folder("packing-speed")?.csv(&speeds)?;
+        folder("packing-kernels")?.csv(&kernels)?;
+        folder("packing-strategies")?.csv(&strategies)?;
+        let tables = [
+            speed::table_of(&speeds),
+            speed::table_of_kernels(&kernels),
+            strategy::table_of(&strategies),
+        ];
+        write!(body, "\n{}", tables.join("\n"))?;
+    }
+    progress.finish();
     folder("packing")?.page("How fast and how well the atlas is managed", &body)?;
     Ok(body)
 }
