@@ -3,25 +3,7 @@
 // One thread per run of patches counts, a group sums up, one thread per run writes.
 // Twin: `Placer::gather` in place.rs.
 
-var<workgroup> sums: array<vec2<u32>, 256>;
 var<workgroup> area_count: array<atomic<u32>, 1024>;
-
-// Turns what each thread of a group of `lanes` has into what all before it have;
-// the last thread's result plus its own is all.
-fn sum_before(lane: u32, lanes: u32, own: vec2<u32>) -> vec2<u32> {
-    sums[lane] = own;
-    for (var step = 1u; step < lanes; step *= 2u) {
-        workgroupBarrier();
-        var more = vec2<u32>(0u);
-        if (lane >= step) {
-            more = sums[lane - step];
-        }
-        workgroupBarrier();
-        sums[lane] += more;
-    }
-    workgroupBarrier();
-    return sums[lane] - own;
-}
 
 @compute @workgroup_size(64)
 fn count_active(@builtin(global_invocation_id) id: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {

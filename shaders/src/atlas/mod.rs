@@ -46,6 +46,7 @@ pub use superblocks::{Provision, Superblocks, Tail, free_texels};
 /// `request`, `scan_slots`, `provision`, `walk`, `raise`, `release` and `assign`.
 pub const SOURCE: &str = concat!(
     include_str!("records.wgsl"),
+    include_str!("../scan.wgsl"),
     include_str!("level.wgsl"),
     include_str!("gather.wgsl"),
     include_str!("bias.wgsl"),

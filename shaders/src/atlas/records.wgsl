@@ -97,6 +97,7 @@ const BROKEN: u32 = 4u;
 
 // Consecutive patches of one thread. Results do not depend on it.
 override RUN: u32 = 32u;
+alias Sums = vec2<u32>;
 // Threads of a group that sums up, at most 256. Results do not depend on it.
 override LANES: u32 = 256u;
 
@@ -124,17 +125,8 @@ override LANES: u32 = 256u;
 // A bit for each patch that has a block.
 @group(0) @binding(11) var<storage, read_write> held: array<atomic<u32>>;
 
-fn runs_of(count: u32) -> u32 {
-    return (count + RUN - 1u) / RUN;
-}
-
 // Where in `slots` the run counts blocks of a kind (0 requests, 1 released, 2
 // idle) and level.
 fn slot_at(kind: u32, level: u32, run: u32) -> u32 {
     return (kind * level_count() + level) * runs_of(atlas.patch_count) + run;
-}
-
-// Threads in groups of 64 may be folded into two dimensions.
-fn thread_of(id: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return id.x + id.y * groups.x * 64u;
 }

@@ -68,18 +68,23 @@ struct Job {
     stride: u32,
 }
 
-fn job_at(index: u32) -> Job {
+// The slot that a job is of, or a tile.
+fn slot_with(index: u32, is_tile: bool) -> SlotRecord {
     var low = 0u;
     var high = parameters.slot_count - 1u;
     while (low < high) {
         let middle = (low + high + 1u) / 2u;
-        if (slots[middle].first_job <= index) {
+        if (select(slots[middle].first_job, slots[middle].first_tile, is_tile) <= index) {
             low = middle;
         } else {
             high = middle - 1u;
         }
     }
-    let slot = slots[low];
+    return slots[low];
+}
+
+fn job_at(index: u32) -> Job {
+    let slot = slot_with(index, false);
     let local = index - slot.first_job;
     let columns = jobs_across(slot).x;
     return job_of(slot, vec2<u32>(local % columns, local / columns));

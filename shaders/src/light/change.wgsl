@@ -69,7 +69,7 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     if (tile >= parameters.tile_count) {
         return;
     }
-    let slot = slot_of_tile(tile);
+    let slot = slot_with(tile, true);
     let across = jobs_across(slot);
     let columns = tiles_across(slot).x;
     let corner = vec2<u32>((tile - slot.first_tile) % columns, (tile - slot.first_tile) / columns) * TILE_SIDE;
@@ -120,20 +120,6 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
         judged.glossy_excess = excess.glossy / max(change.paths, 1.0);
         judgements[tile] = judged;
     }
-}
-
-fn slot_of_tile(tile: u32) -> SlotRecord {
-    var low = 0u;
-    var high = parameters.slot_count - 1u;
-    while (low < high) {
-        let middle = (low + high + 1u) / 2u;
-        if (slots[middle].first_tile <= tile) {
-            low = middle;
-        } else {
-            high = middle - 1u;
-        }
-    }
-    return slots[low];
 }
 
 // What one path says, whose first texel is `at`.

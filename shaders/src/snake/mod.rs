@@ -58,6 +58,7 @@ pub use superblocks::{Extent, MOST_EXTENTS, Superblocks, capacity_of};
 /// `scan_high`, `scatter_high` and `assign`.
 pub const SOURCE: &str = concat!(
     include_str!("records.wgsl"),
+    include_str!("../scan.wgsl"),
     include_str!("bins.wgsl"),
     include_str!("gather.wgsl"),
     include_str!("scale.wgsl"),

@@ -159,6 +159,7 @@ const PLACED: u32 = 6u;
 
 // Consecutive triangles of one thread. Results do not depend on it.
 override RUN: u32 = 32u;
+alias Sums = vec4<u32>;
 // Threads of a group that sums up, at most 256. Results do not depend on it.
 override LANES: u32 = 256u;
 
@@ -189,31 +190,3 @@ override LANES: u32 = 256u;
 @group(0) @binding(13) var<storage, read_write> taken: array<atomic<u32>>;
 // Free slots before each of those words.
 @group(0) @binding(14) var<storage, read_write> free_before: array<u32>;
-
-var<workgroup> sums: array<vec4<u32>, 256>;
-
-fn runs_of(count: u32) -> u32 {
-    return (count + RUN - 1u) / RUN;
-}
-
-// Threads in groups of 64 may be folded into two dimensions.
-fn thread_of(id: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return id.x + id.y * groups.x * 64u;
-}
-
-// Turns what each thread of a group of `lanes` has into what all before it have.
-fn sum_before(lane: u32, lanes: u32, own: vec4<u32>) -> vec4<u32> {
-    workgroupBarrier();
-    sums[lane] = own;
-    for (var step = 1u; step < lanes; step *= 2u) {
-        workgroupBarrier();
-        var more = vec4<u32>(0u);
-        if (lane >= step) {
-            more = sums[lane - step];
-        }
-        workgroupBarrier();
-        sums[lane] += more;
-    }
-    workgroupBarrier();
-    return sums[lane] - own;
-}

@@ -37,7 +37,7 @@ fn scan_active(@builtin(local_invocation_index) lane: u32) {
     for (var run = begin; run < end; run++) {
         own += runs[run];
     }
-    var before = sum_before(lane, own);
+    var before = sum_before(lane, LANES, own);
     for (var run = begin; run < end; run++) {
         let here = runs[run];
         runs[run] = before;

@@ -43,6 +43,7 @@ pub const MEASURE_SOURCE: &str = concat!(
 /// `scan_digits`, `scatter` and `place`.
 pub const SOURCE: &str = concat!(
     include_str!("records.wgsl"),
+    include_str!("../scan.wgsl"),
     include_str!("gather.wgsl"),
     include_str!("choose.wgsl"),
     include_str!("sort.wgsl"),

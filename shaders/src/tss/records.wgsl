@@ -51,6 +51,7 @@ const STATUS_EVICTED: u32 = 2u;
 
 // Consecutive patches or triangles of one thread. Results do not depend on it.
 override RUN: u32 = 32u;
+alias Sums = vec2<u32>;
 // Threads of a group that sums up, at most 256. Results do not depend on it.
 override LANES: u32 = 256u;
 // Of the two digits of a kind, which one is sorted by: first the width's, then the
@@ -86,34 +87,6 @@ var<private> spans: array<u32, 32> = array<u32, 32>(
 
 // A triangle is slanted where its longest edge is four times its height, steps.
 const SLANTED: u32 = 512u;
-
-var<workgroup> sums: array<vec2<u32>, 256>;
-
-fn runs_of(count: u32) -> u32 {
-    return (count + RUN - 1u) / RUN;
-}
-
-// Threads in groups of 64 may be folded into two dimensions.
-fn thread_of(id: vec3<u32>, groups: vec3<u32>) -> u32 {
-    return id.x + id.y * groups.x * 64u;
-}
-
-// Turns what each thread of a group of `LANES` has into what all before it have; the
-// last thread's result plus its own is all.
-fn sum_before(lane: u32, own: vec2<u32>) -> vec2<u32> {
-    sums[lane] = own;
-    for (var step = 1u; step < LANES; step *= 2u) {
-        workgroupBarrier();
-        var more = vec2<u32>(0u);
-        if (lane >= step) {
-            more = sums[lane - step];
-        }
-        workgroupBarrier();
-        sums[lane] += more;
-    }
-    workgroupBarrier();
-    return sums[lane] - own;
-}
 
 fn class_of(steps: u32) -> u32 {
     return min(min((steps + 32u) >> 6u, CLASSES - 1u), tss.most_class);

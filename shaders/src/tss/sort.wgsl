@@ -50,7 +50,7 @@ fn scan_digits(@builtin(local_invocation_index) lane: u32) {
     for (var at = begin; at < end; at++) {
         own += digits[at];
     }
-    var before = sum_before(lane, vec2<u32>(own, 0u)).x;
+    var before = sum_before(lane, LANES, vec2<u32>(own, 0u)).x;
     for (var at = begin; at < end; at++) {
         let here = digits[at];
         digits[at] = before;
