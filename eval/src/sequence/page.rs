@@ -126,10 +126,10 @@ fn means(found: &Measured) -> String {
     table(&columns, rows.into_iter())
 }
 
-/// In words of a table; none where there is nothing to compare with.
+/// In words of a table; none to what the table shows as nothing.
 fn ratio(ours: f64, theirs: f64) -> String {
     let ratio = ours / theirs;
-    if ratio.is_finite() {
+    if ratio.is_finite() && theirs >= 5e-5 {
         format!("{ratio:.2}")
     } else {
         "–".into()

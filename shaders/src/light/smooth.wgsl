@@ -3,10 +3,11 @@
 //
 // Diffuse light, glossy light and the share of the sun that is seen are each the mean
 // over a small window of the slot, each neighbour counting by its samples and by how
-// likely the difference is noise; diffuse light besides over the surroundings in the world, which reach
-// across the borders of patches. All fades out as the texel's own error falls, so
-// that a still scene converges to what was traced. Colour, normal, emission and the
-// sun's reflection are those of the texel's middle: they are free of noise.
+// likely the difference is noise; diffuse light besides over the surroundings in the
+// world, which reach across the borders of patches. All fades out as the texel's own
+// error falls, so that a still scene converges to what was traced. Colour, normal,
+// emission and the sun's reflection are those of the texel's middle: they are free of
+// noise.
 // One workgroup per slot; reads the scene and what texels remember, writes `shown`.
 // Source: Schied et al., "Spatiotemporal Variance-Guided Filtering", 2017,
 // sections 4.1 and 4.4, with one small window instead of a pyramid.
@@ -182,7 +183,7 @@ fn smooth_slots(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgroups
                     if (HAS_SUN) {
                         let variance = share_variance + variance_of_share(moments[near].x, other.w);
                         let difference = (moments[near].x - moments[at].x) / SHARE_TOLERANCE;
-                        let weight = other.w * exp(-difference * difference / variance);
+                        let weight = other.w * exp(-difference * difference / max(variance, 1e-12));
                         sum_share += moments[near].x * weight;
                         weight_of_shares += weight;
                     }
