@@ -45,8 +45,9 @@ const QUICK_SIZES: usize = 2;
 
 /// Triangles of the built-in scene, where no other is named.
 const TRIANGLES: [usize; 3] = [15_000, 250_000, 1_000_000];
-/// Sides of the atlases, texels: 1, 4 and 8 MPix.
-const SIZES: [[u16; 2]; 3] = [[1024, 1024], [2048, 2048], [4096, 2048]];
+/// Sides of the atlases, texels: 1, 4 and 8 MPix. The last is the widest picture that
+/// the video encoder takes, in whole superblocks.
+const SIZES: [[u16; 2]; 3] = [[1024, 1024], [2048, 2048], [3840, 2048]];
 
 /// Measures how fast and how well the atlas is managed.
 #[derive(Args, Debug)]
