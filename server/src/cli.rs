@@ -5,6 +5,7 @@ use std::{ffi::OsString, net::SocketAddr, path::PathBuf};
 use clap::{Args, Parser, Subcommand};
 use glam::Vec3;
 use shadecast_protocol::Method;
+use shadecast_server::encode::OpenH264;
 
 /// Name of the built-in scene.
 pub(crate) const BUILT_IN: &str = "courtyard";
@@ -16,7 +17,7 @@ pub(crate) const BUILT_IN: &str = "courtyard";
     after_help = "\
 Examples:
   shadecast serve courtyard            serve the built-in scene; start a client with the line it prints
-  shadecast serve castle.glb --atlas 4096 --bitrate 40
+  shadecast serve castle.glb --atlas 2048 --bitrate 40 --method snake
   shadecast render castle.glb --out castle.exr --spp 256
   shadecast inspect castle.glb         what is in a scene, and what it lets the server leave out
   shadecast scene courtyard --out courtyard.glb --triangles 250000"
@@ -270,11 +271,14 @@ fn triangles(text: &str) -> Result<usize, String> {
     }
 }
 
-/// What the video can be: whole macroblocks, and no more than decoders take.
+/// What the video can be: whole macroblocks, and no more than the encoder takes.
 fn atlas_side(text: &str) -> Result<u16, String> {
+    const MOST: u16 = OpenH264::LARGEST_SQUARE;
     match text.parse::<u16>() {
-        Ok(side @ 64..=8192) if side.is_multiple_of(16) => Ok(side),
-        _ => Err("a multiple of 16 from 64 to 8192 is expected".to_owned()),
+        Ok(side @ 64..=MOST) if side.is_multiple_of(16) => Ok(side),
+        _ => Err(format!(
+            "a multiple of 16 from 64 to {MOST} is expected: the video encoder takes no larger pictures"
+        )),
     }
 }
 

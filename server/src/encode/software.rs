@@ -32,6 +32,10 @@ impl std::fmt::Debug for OpenH264 {
 }
 
 impl OpenH264 {
+    /// Side of the largest square picture that it takes, and so of an atlas, pixels: of
+    /// others the longer side is at most 3840.
+    pub const LARGEST_SQUARE: u16 = 2160;
+
     /// For about `bits_per_second` at `pictures_per_second`.
     ///
     /// # Errors
@@ -167,8 +171,8 @@ mod tests {
     use openh264::decoder::Decoder;
 
     /// 32 by 32 blocks of strong contrast, as an atlas has them.
-    fn blocks(shift: u8) -> Planes {
-        let (width, height) = (128_u32, 128_u32);
+    fn blocks(side: u16, shift: u8) -> Planes {
+        let (width, height) = (u32::from(side), u32::from(side));
         let mut bytes = vec![128; (width * height * 3 / 2) as usize];
         for y in 0..height {
             for x in 0..width {
@@ -184,11 +188,21 @@ mod tests {
     }
 
     #[test]
+    fn the_largest_square_is_taken_and_no_larger_one() {
+        let encode = |side| {
+            let mut encoder = OpenH264::new(1_000_000, 30.0).unwrap();
+            encoder.encode(&blocks(side, 0), true)
+        };
+        assert!(encode(OpenH264::LARGEST_SQUARE).is_ok());
+        assert!(encode(OpenH264::LARGEST_SQUARE + 16).is_err());
+    }
+
+    #[test]
     fn pictures_survive_and_block_borders_stay_sharp() {
         let mut encoder = OpenH264::new(200_000, 30.0).unwrap();
         let mut decoder = Decoder::new().unwrap();
         for step in 0..6 {
-            let planes = blocks(step);
+            let planes = blocks(128, step);
             let picture = encoder.encode(&planes, step == 4).unwrap();
             assert_eq!(picture.idr, step == 0 || step == 4, "picture {step}");
             let decoded = decoder.decode(&picture.bytes).unwrap().expect("a picture");
@@ -208,7 +222,7 @@ mod tests {
     fn a_coarser_quality_takes_fewer_bytes() {
         let bytes = [10, 24, 40].map(|step| {
             let mut encoder = OpenH264::of_quality(step).unwrap();
-            let mut planes = blocks(0);
+            let mut planes = blocks(128, 0);
             // Detail that quantisation can lose.
             for (i, value) in planes.bytes[..128 * 128].iter_mut().enumerate() {
                 *value += (i * 7 % 13) as u8;
@@ -221,7 +235,7 @@ mod tests {
     #[test]
     fn the_stream_says_its_colour_space() {
         let mut encoder = OpenH264::new(200_000, 30.0).unwrap();
-        let picture = encoder.encode(&blocks(0), true).unwrap();
+        let picture = encoder.encode(&blocks(128, 0), true).unwrap();
         // A sequence parameter set comes first.
         assert_eq!(picture.bytes[4] & 31, 7);
     }
