@@ -382,13 +382,13 @@ impl Pipeline {
         let rounds = if self.light.is_even() { 0 } else { MOST_ROUNDS };
         for _ in 0..rounds {
             let left = budget.saturating_sub(paths);
-            let jobs = self.schedule.choose(patches, visible.clone(), left, eyes);
-            let traced: u32 = jobs.iter().map(Job::paths).sum();
+            let mut jobs = self.schedule.choose(patches, visible.clone(), left, eyes);
             // A block larger than its budget gets its turn in the first round only.
-            if paths > 0 && traced > left {
+            if paths > 0 && jobs.iter().map(Job::paths).sum::<u32>() > left {
                 break;
             }
-            self.light.trace(&self.gpu, &self.gpu_scene, &jobs, viewer);
+            jobs.truncate((self.light).trace(&self.gpu, &self.gpu_scene, &jobs, viewer));
+            let traced: u32 = jobs.iter().map(Job::paths).sum();
             self.schedule.traced(&jobs);
             paths += traced;
             lit.extend(jobs.into_iter().map(|job| (job.patch(), job)));

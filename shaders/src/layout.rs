@@ -15,6 +15,17 @@ fn module(name: &str, source: &str) -> naga::Module {
     module
 }
 
+/// A constant whole number.
+fn number(module: &naga::Module, name: &str) -> u32 {
+    let mut constants = module.constants.iter();
+    let found = constants.find(|(_, constant)| constant.name.as_deref() == Some(name));
+    let init = found.map(|(_, constant)| &module.global_expressions[constant.init]);
+    match init {
+        Some(naga::Expression::Literal(naga::Literal::U32(number))) => *number,
+        other => panic!("{name} is {other:?}"),
+    }
+}
+
 fn members(module: &naga::Module, name: &str) -> (u32, Vec<(String, u32)>) {
     let found = module
         .types
@@ -203,6 +214,7 @@ fn layouts_match() {
     assert_eq!(u64::from(members(&atlas, "Ray").0) * 3, RAY_BYTES);
     assert_eq!(u64::from(members(&atlas, "Cell").0), CELL_BYTES);
     assert_eq!(u64::from(members(&atlas, "Judgement").0), JUDGEMENT_BYTES);
+    assert_eq!(number(&atlas, "TILE_SIDE"), TILE_SIDE);
     let still = module("still", STILL_SOURCE);
     same_layout!(
         &still,

@@ -126,7 +126,7 @@ fn means(found: &Measured) -> String {
     table(&columns, rows.into_iter())
 }
 
-/// In words of a table; none to what the table shows as nothing.
+/// In words of a table; none to what its four decimals show as nothing.
 fn ratio(ours: f64, theirs: f64) -> String {
     let ratio = ours / theirs;
     if ratio.is_finite() && theirs >= 5e-5 {

@@ -55,14 +55,14 @@ const PERIOD: Duration = Duration::from_secs(1);
 const NEAR: Duration = Duration::from_millis(250);
 const FAR: Duration = Duration::from_millis(750);
 
-/// The glowing box near to the wall and far from it, out of sight.
+/// Near to the wall and far from it, both out of sight.
 const ABOVE: [Vec3; 2] = [vec3(0.0, 1.5, -2.4), vec3(0.0, 4.0, 1.0)];
 
 fn bounces() -> Integrator {
     Integrator::with_bounces(1)
 }
 
-/// A wall, and a glowing box that leaps; the view shows the wall only.
+/// A wall, and a glowing box that leaps between two places.
 fn leaping_lamp([near, far]: [Vec3; 2]) -> (Scene, View) {
     let mut scene = Scene {
         sky: SkyModel::constant(Vec3::splat(0.02)),

@@ -159,7 +159,8 @@ impl Light {
         let kernels = SlotKernels::of(method);
         let texel_count = u64::from(size[0]) * u64::from(size[1]);
         let most_slots = MOST_SLOTS.min(texel_count / 4).max(1);
-        // A small slot is a tile; of a large one, thin as it may be, a tile is 16 texels.
+        // A small slot is a tile; the tiles of large ones have 16 texels and more, but for
+        // rows of one texel: `trace` takes no more than there is room for.
         let most_tiles = most_slots + texel_count / 16;
         let own_layout = layout(
             gpu,
@@ -378,8 +379,8 @@ impl Light {
     }
 
     /// Traces the paths of `jobs`, of which a slot has one at most: a texel takes its
-    /// paths one after the other.
-    pub fn trace(&self, gpu: &Gpu, gpu_scene: &GpuScene, jobs: &[Job], viewer: Viewer) {
+    /// paths one after the other. Tells how many of the jobs there was room for.
+    pub fn trace(&self, gpu: &Gpu, gpu_scene: &GpuScene, jobs: &[Job], viewer: Viewer) -> usize {
         let mut records = Vec::new();
         let (mut path_count, mut tile_count) = (0, 0);
         let jobs = &jobs[..jobs.len().min(self.most_slots())];
@@ -402,6 +403,7 @@ impl Light {
             from_camera: false,
         };
         self.paths.follow(gpu, gpu_scene, ends, path_count);
+        slot_count as usize
     }
 
     /// Makes what is shown of the slots of `lit`, which were traced, and of `unlit`,

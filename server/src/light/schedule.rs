@@ -3,7 +3,8 @@
 //! The budget is a number of paths. Slots that were never lit come first, all
 //! of them: if they are too many, each path lights two by two texels, then four
 //! by four, and so on, so that a first look never waits. What is left goes
-//! where a path removes most visible error: many pixels, much noise, few samples.
+//! where a path removes most visible error: many pixels, much noise, few samples,
+//! or long not looked at.
 
 use glam::Vec3;
 use shadecast_protocol::{PatchId, PatchShape, Slot};
@@ -240,7 +241,8 @@ impl Schedule {
             let believed =
                 (lit.noise * lit.noise * lit.worth + expected * BELIEF) / (lit.worth + BELIEF);
             // Squared error that one more sample removes, as a Kalman filter has it: that
-            // of a sample, and that of what is known, which grows while nobody looks.
+            // of a sample, and that of what is known, which grows while nobody looks. One
+            // look settles it: what it contradicts, `measure_change` ends.
             let of_sample = believed * lit.worth;
             let unseen = self.update.wrapping_sub(lit.update) as f32;
             let known = of_sample / self.worth(id, job.glossy_keep) + DRIFT * DRIFT * unseen;

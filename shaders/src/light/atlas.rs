@@ -3,7 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::Vec2;
 
-/// Jobs on a side of a tile, whose paths are judged together.
+/// Jobs on a side of a tile at most; its paths are judged together.
 pub const TILE_SIDE: u32 = 8;
 
 /// What is the same for all jobs of a dispatch.

@@ -29,8 +29,9 @@ struct LightParameters {
 @group(2) @binding(3) var<storage, read_write> glossy: array<vec4<f32>>;
 @group(2) @binding(6) var<storage, read_write> moments: array<vec4<f32>>;
 
-// Jobs on a side of a tile: what was found is judged tile by tile, so that a shadow
-// that falls on a small part of a large slot is noticed there.
+// Jobs on a side of a tile at most: what was found is judged tile by tile, so that a
+// shadow that falls on a small part of a large slot is noticed there. A slot's tiles are
+// of about one size: of a sliver's few paths nothing could be told.
 const TILE_SIDE: u32 = 8u;
 
 // Samples over which means run where a moving object was met.
@@ -93,7 +94,8 @@ fn job_at(index: u32) -> Job {
 fn job_of(slot: SlotRecord, place: vec2<u32>) -> Job {
     var job: Job;
     job.slot = slot;
-    job.tile = slot.first_tile + place.x / TILE_SIDE + place.y / TILE_SIDE * tiles_across(slot).x;
+    let tile = place / tile_size(slot);
+    job.tile = slot.first_tile + tile.x + tile.y * tiles_across(slot).x;
     job.laid = laid(slot);
     job.stride = 1u << log2_stride_of(slot);
     job.corner = place * job.stride;
@@ -114,6 +116,12 @@ fn jobs_across(slot: SlotRecord) -> vec2<u32> {
 
 fn tiles_across(slot: SlotRecord) -> vec2<u32> {
     return (jobs_across(slot) + TILE_SIDE - 1u) / TILE_SIDE;
+}
+
+// Jobs of a tile on either axis; the last ones have fewer.
+fn tile_size(slot: SlotRecord) -> vec2<u32> {
+    let tiles = tiles_across(slot);
+    return (jobs_across(slot) + tiles - 1u) / tiles;
 }
 
 // The first of a square of texels that is the slot's own, and whether there is any.

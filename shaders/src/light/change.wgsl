@@ -12,7 +12,7 @@ struct Judgement {
     kept: vec2<f32>,
     // Luminance that a diffuse and a glossy path usually bring here.
     usual: vec2<f32>,
-    // What one path is short of by `limited`, on average over the wave's paths.
+    // What one path is short of by `limited`, on average over the tile's in the wave.
     diffuse_excess: vec3<f32>,
     // Paths that the cells about the tile have heard of, on average.
     around: f32,
@@ -72,15 +72,20 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
     let slot = slot_with(tile, true);
     let across = jobs_across(slot);
     let columns = tiles_across(slot).x;
-    let corner = vec2<u32>((tile - slot.first_tile) % columns, (tile - slot.first_tile) / columns) * TILE_SIDE;
-    let place = corner + vec2<u32>(lane % TILE_SIDE, lane / TILE_SIDE);
-    let job = job_of(slot, place);
+    let size = tile_size(slot);
+    let inside = vec2<u32>(lane % TILE_SIDE, lane / TILE_SIDE);
+    let place = vec2<u32>((tile - slot.first_tile) % columns, (tile - slot.first_tile) / columns) * size + inside;
     // Of the wave; of another one it wraps around, and is too large.
     let index = slot.first_job + place.y * across.x + place.x - wave.first_job;
-    let is_traced = all(place < across) && index < wave.path_count && job.stride != 0u;
+    var is_traced = all(inside < size) && all(place < across) && index < wave.path_count;
     var change: Change;
     var found: Found;
-    let at = index_of_texel(job.laid, job.first);
+    var at = 0u;
+    if (is_traced) {
+        let job = job_of(slot, place);
+        at = index_of_texel(job.laid, job.first);
+        is_traced = job.stride != 0u;
+    }
     if (is_traced) {
         found = found_by(paths[index]);
         change = change_by(at, slot, found, cell_light(paths[index].cell));

@@ -1,4 +1,4 @@
-// How noisy each slot just lit still is, as it is seen.
+// How well each slot is known, as it is seen.
 // One thread per slot; reads what its texels remember and what is shown of them,
 // writes `qualities`.
 
@@ -44,5 +44,6 @@ fn measure_noise(@builtin(global_invocation_id) id: vec3<u32>) {
             count += 1.0;
         }
     }
-    qualities[id.x] = Quality(sum / max(count, 1.0), count / max(of_samples, 1e-6));
+    // A slot without a texel of its own lacks nothing.
+    qualities[id.x] = Quality(sum / max(count, 1.0), select(1e6, count / of_samples, count > 0.0));
 }

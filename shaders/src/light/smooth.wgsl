@@ -27,6 +27,8 @@ const FIRM_TOLERANCE: f32 = 1.0;
 // Samples half way between both: a compromise of the demo, where paths are rare, and
 // of `sequence` at six a pixel.
 const FIRM_SAMPLES: f32 = 12.0;
+// Tolerance for the share of the sun, whose shadows have edges.
+const SHARE_TOLERANCE: f32 = 0.7;
 
 // Relative standard deviation that a sample has at least. Reflections of wide lamps
 // have hardly any, and shapes that smoothing would take from them.
@@ -35,8 +37,6 @@ const LEAST_GLOSSY_NOISE: f32 = 0.5;
 // Samples of a texel by which the surroundings count half as much: they know less
 // and less that it does not know itself, and are wider than its window.
 const SURROUNDED_SAMPLES: f32 = 4.5;
-// The same for the share of the sun, whose shadows have edges.
-const SHARE_TOLERANCE: f32 = 0.7;
 
 // Turn of the normal, in GGX alphas, that one look at the sun's reflection covers,
 // and looks along a texel's side at most.
