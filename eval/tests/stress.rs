@@ -80,6 +80,8 @@ cases! {
     #[ignore = "needs a Vulkan driver"]
     alternating_light;
     #[ignore = "needs a Vulkan driver"]
+    leaping_shadow;
+    #[ignore = "needs a Vulkan driver"]
     uneven_time;
     #[ignore = "needs a Vulkan driver"]
     distant_time;

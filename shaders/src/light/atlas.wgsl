@@ -44,7 +44,7 @@ const BRIGHTEST_PATH: f32 = 1e18;
 // Brightness of a path, in that usual about it, which one sample may have.
 const OUTSHINING: f32 = 8.0;
 // The same of what a tile's paths are short of: a whole tile would show it as a spot.
-const OUTSHINING_TOGETHER: f32 = 0.3;
+const OUTSHINING_TOGETHER: f32 = 1.0;
 // Displayed brightness that is usual everywhere.
 const FAINT: f32 = 0.05;
 
