@@ -132,7 +132,9 @@ fn change_by(at: u32, slot: SlotRecord, found: Found, around: vec4<f32>) -> Chan
     let samples = vec3<f32>(diffuse[at].w, glossy[at].w * slot.glossy_keep, diffuse[at].w);
     let remembered = vec3<f32>(luminance(diffuse[at].rgb), luminance(glossy[at].rgb), moments[at].x);
     let squares = vec3<f32>(moments[at].yz, moments[at].x);
-    let spread = max(squares - remembered * remembered, vec3<f32>(0.0));
+    // Samples that were all alike do not make it certain that the next one is.
+    let doubt = max(remembered * remembered, vec3<f32>(0.0, 0.0, 1.0)) / (samples + 2.0);
+    let spread = max(squares - remembered * remembered, doubt);
     let has_opinion = select(vec3<f32>(0.0), vec3<f32>(1.0), samples >= vec3<f32>(OPINION));
     let brightness = vec2<f32>(luminance(found.diffuse), luminance(found.glossy));
     let difference = vec3<f32>(brightness, found.sun) - remembered;
