@@ -256,10 +256,8 @@ fn accumulated_light_goes_where_slots_go() {
             } else {
                 then.samples.min(CARRIED)
             };
-            // Chance may cost a part, where noise looks like a change of light; what had
-            // lost its history would have a sample.
             assert!(
-                now.samples >= 1.0 && now.samples > least * 0.3,
+                now.samples >= 1.0 && now.samples > least - 0.01,
                 "{method:?} {patch:?}: {then:?} {now:?}"
             );
             assert!(

@@ -40,9 +40,10 @@ struct Change {
     // Of the difference, were it noise alone.
     variance: vec3<f32>,
     remembered: vec3<f32>,
-    // Of the differences upwards: a path in a thousand that finds a lamp in a mirror
-    // is no change, and is left out.
-    largest: vec3<f32>,
+    // The farthest differences either way, which are left out: a path in a thousand that
+    // finds a lamp in a mirror is no change, and neither is one that is shadowed.
+    highest: vec3<f32>,
+    lowest: vec3<f32>,
     // Without what the sun brings.
     found: vec2<f32>,
     brightest: vec2<f32>,
@@ -97,7 +98,8 @@ fn measure_change(@builtin(workgroup_id) group: vec3<u32>, @builtin(num_workgrou
             change.difference += changes[i].difference;
             change.variance += changes[i].variance;
             change.remembered += changes[i].remembered;
-            change.largest = max(change.largest, changes[i].largest);
+            change.highest = max(change.highest, changes[i].highest);
+            change.lowest = min(change.lowest, changes[i].lowest);
             change.found += changes[i].found;
             change.brightest = max(change.brightest, changes[i].brightest);
             change.paths += changes[i].paths;
@@ -145,14 +147,15 @@ fn change_by(at: u32, slot: SlotRecord, found: Found, around: vec4<f32>) -> Chan
     change.samples = samples.xy;
     change.around = vec2<f32>(luminance(around.rgb), around.w);
     change.difference = difference * has_opinion;
-    change.largest = max(change.difference, vec3<f32>(0.0));
+    change.highest = max(change.difference, vec3<f32>(0.0));
+    change.lowest = min(change.difference, vec3<f32>(0.0));
     change.variance = spread * (1.0 + 1.0 / max(samples, vec3<f32>(1.0))) * has_opinion;
     change.remembered = remembered * has_opinion;
     return change;
 }
 
 fn judgement_of(of_all: Change) -> Judgement {
-    let difference = of_all.difference - of_all.largest;
+    let difference = of_all.difference - of_all.highest - of_all.lowest;
     let least = NO_CHANGE * max(of_all.remembered, abs(difference));
     // Ratios of roots: squares of the brightest light leave the range of f32.
     let surprise = abs(difference) / max(sqrt(of_all.variance) + least, vec3<f32>(1e-18));
