@@ -8,6 +8,7 @@ use shadecast_server::{
 use shadecast_shaders::atlas::{Memory, Seen};
 
 use super::{
+    SIZES,
     quadtree::Quadtree,
     strategies::{Grids, Without},
     trace,
@@ -19,8 +20,6 @@ pub(super) const TRIANGLES: usize = 100_000;
 /// Frames of the walk: as many as figure 11 averages over.
 const FRAMES: u32 = 1000;
 const QUICK_FRAMES: u32 = 150;
-/// Sides of the atlases, texels: 1, 4 and 8 MPix.
-const SIZES: [[u16; 2]; 3] = [[1024, 1024], [2048, 2048], [3840, 2048]];
 /// Superblocks of an atlas are this many on its shorter side.
 const SUPERBLOCKS: u16 = 8;
 
