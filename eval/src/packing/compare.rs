@@ -39,7 +39,7 @@ const WINDOW: u32 = 160;
 /// Frames of the walk.
 const FRAMES: u32 = 60;
 const QUICK_FRAMES: u32 = 8;
-/// Of these, as many as are compared at least, where there are as many.
+/// Of these, those whose pictures are compared: so many or more, where there are.
 const COMPARED: u32 = 6;
 const QUICK_COMPARED: u32 = 2;
 /// Within this field windows lie, across and up, radians.

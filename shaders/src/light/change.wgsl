@@ -48,7 +48,7 @@ struct Change {
     found: vec2<f32>,
     brightest: vec2<f32>,
     paths: f32,
-    // What is remembered is worth.
+    // That what is remembered is worth, diffuse and glossy.
     samples: vec2<f32>,
     // Light of the cells that the paths add to, and its paths.
     around: vec2<f32>,
